@@ -61,13 +61,14 @@ def facts(effect: Mapping[str, Any]) -> str:
         out.append(f"Contains {', '.join(f'`{n}`' for n in effect['contains'])}.")
     if effect["twins"]:
         twins = ", ".join(f"`{n}`" for n in effect["twins"])
-        alone = "Of an axis alone, commands" if effect["family"] == "timing" else "Commands"
+        alone = "Of an axis alone, commands" if effect["twins_alone"] else "Commands"
         out.append(f"{alone} and motor angles are those of {twins}: no log tells them apart.")
     if effect["usual"]:
         usual = ", ".join(f"`{n}`" for n in effect["usual"])
         out.append(
             f"Where a motion asks little of it, it looks like {usual}, which is met more often."
         )
+    out += kin(effect)
     if effect["parts"]:
         out.append(f"Two simpler ones imitate it: {', '.join(f'`{n}`' for n in effect['parts'])}.")
     if effect["stands_for"]:
@@ -76,6 +77,25 @@ def facts(effect: Mapping[str, Any]) -> str:
     inverse = "can" if effect["inverse_dynamics"] else "cannot"
     out.append(f"A linear model holds it {LINEAR[effect['linear']]}; inverse dynamics {inverse}.")
     return " ".join(out)
+
+
+def kin(effect: Mapping[str, Any]) -> list[str]:
+    """Return what it is akin to, and by how much formulas of it differ, in sentences."""
+    out = []
+    if plainer := effect["plainer"]:
+        adds = ", ".join(f"`{n}`" for n in plainer["adds"])
+        out.append(
+            f"Where {adds} {'show' if len(plainer['adds']) > 1 else 'shows'} nothing, `{plainer['law']}` is "
+            f"{plainer['likelier']:g} times likelier."
+        )
+    if like := effect["resembles"]:
+        shape = ", ".join(f"`{name}` {value:.3g}" for name, value in like["shape"])
+        out.append(
+            f"With {shape} it is like `{like['law']}` of {like['ratio']:.3g} `{like['size']}`."
+        )
+    error = f"{100 * effect['formula']['error']:g} %"
+    out.append(f"Formulas of it may differ by {error} of what it explains.")
+    return out
 
 
 def article(word: str) -> str:

@@ -89,6 +89,63 @@ class ParameterInfo(TypedDict):
     lower: float
     upper: float
     typical: float
+    marks: list[
+        Literal["optional", "place", "notation", "fastest_time", "shows_inverse", "held_first"]
+    ]
+
+@type_check_only
+class FormulaInfo(TypedDict):
+    """What two formulas of an effect may differ by, as shares [1]."""
+
+    kind: Literal["lag", "friction", "exact"] | None
+    error: float
+    held: Literal["always", "near_noise", "next_to_nothing"]
+    white: bool
+    value_error: float
+    of_each: bool
+
+@type_check_only
+class PlainerInfo(TypedDict):
+    """The law that an effect is without what it adds."""
+
+    law: str
+    adds: list[str]
+    likelier: float
+    shown: Literal["sizes", "rise"]
+
+@type_check_only
+class ResemblesInfo(TypedDict):
+    """Another effect that one is like, and with which parameters."""
+
+    law: str
+    size: str
+    ratio: float
+    shape: list[tuple[str, float]]
+    rarer: float
+
+@type_check_only
+class BegunFromInfo(TypedDict):
+    """A law that a fit may begin from; ``takes``: its parameters, each with the one that takes its value."""
+
+    law: str
+    takes: list[tuple[str, str]]
+
+@type_check_only
+class LaterInfo(TypedDict):
+    """Numbers that are looked for where the fit without them ended."""
+
+    amplitude: str
+    begin: float
+    most: float
+    shape: str
+    as_of: str
+
+@type_check_only
+class SpringChangeInfo(TypedDict):
+    """How a law makes a gear another spring."""
+
+    sums: list[list[str]]
+    without_middle: str
 
 @type_check_only
 class EffectInfo(TypedDict):
@@ -106,10 +163,22 @@ class EffectInfo(TypedDict):
     contains: list[str]
     parts: list[str]
     usual: list[str]
+    usual_odds: float
     twins: list[str]
+    twins_alone: bool
+    resembles: ResemblesInfo | None
+    plainer: PlainerInfo | None
+    begun_from: BegunFromInfo | None
+    later: LaterInfo | None
+    law_of: Literal["gear", "dry_friction"] | None
+    formula: FormulaInfo
+    spring: SpringChangeInfo | None
+    scales: Literal["own", "carriers", "every"] | None
     stands_for: tuple[str, str] | None
     linear: str
     inverse_dynamics: bool
+    beside: list[str]
+    unrepeatable: bool
     absorbed_by: list[str]
     shown_by: list[str]
     parameters: list[ParameterInfo]

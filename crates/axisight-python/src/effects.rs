@@ -1,6 +1,9 @@
 //! The effect table and effect settings.
 
-use axisight_core::effects::{EFFECTS, EffectInfo, Linear};
+use axisight_core::effects::{
+    BegunFrom, EFFECTS, EffectInfo, Formula, Later, Linear, ParameterInfo, Plainer, Resembles,
+    SpringChange,
+};
 use axisight_core::robot::{EffectSetting, Place};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -62,7 +65,10 @@ fn describe<'py>(py: Python<'py>, info: &EffectInfo) -> PyResult<Bound<'py, PyDi
     out.set_item("contains", info.contains.to_vec())?;
     out.set_item("parts", info.parts.to_vec())?;
     out.set_item("usual", info.usual.to_vec())?;
+    out.set_item("usual_odds", info.usual_odds)?;
     out.set_item("twins", info.twins.to_vec())?;
+    out.set_item("twins_alone", info.twins_alone)?;
+    kin(&out, info)?;
     let stands_for = info.stands_for.map(|s| (s.quantity, word(&s.change)));
     out.set_item("stands_for", stands_for)?;
     let linear = match info.linear {
@@ -71,22 +77,99 @@ fn describe<'py>(py: Python<'py>, info: &EffectInfo) -> PyResult<Bound<'py, PyDi
     };
     out.set_item("linear", linear)?;
     out.set_item("inverse_dynamics", info.inverse_dynamics)?;
+    out.set_item("beside", info.beside.to_vec())?;
+    out.set_item("unrepeatable", info.unrepeatable)?;
     out.set_item("absorbed_by", words(info.absorbed_by))?;
     out.set_item("shown_by", words(info.shown_by))?;
-    let mut parameters = Vec::new();
-    for p in info.parameters {
-        let row = PyDict::new(py);
-        row.set_item("name", p.name)?;
-        row.set_item("unit", p.unit)?;
-        row.set_item("role", word(&p.role))?;
-        row.set_item("neutral", p.neutral)?;
-        row.set_item("lower", p.lower)?;
-        row.set_item("upper", p.upper)?;
-        row.set_item("typical", p.typical)?;
-        parameters.push(row);
-    }
-    out.set_item("parameters", parameters)?;
+    let parameters: PyResult<Vec<_>> = info.parameters.iter().map(|p| parameter(py, p)).collect();
+    out.set_item("parameters", parameters?)?;
     Ok(out)
+}
+
+fn parameter<'py>(py: Python<'py>, p: &ParameterInfo) -> PyResult<Bound<'py, PyDict>> {
+    let row = PyDict::new(py);
+    row.set_item("name", p.name)?;
+    row.set_item("unit", p.unit)?;
+    row.set_item("role", word(&p.role))?;
+    row.set_item("neutral", p.neutral)?;
+    row.set_item("lower", p.lower)?;
+    row.set_item("upper", p.upper)?;
+    row.set_item("typical", p.typical)?;
+    row.set_item("marks", words(p.marks))?;
+    Ok(row)
+}
+
+/// How an effect and others are akin.
+fn kin(out: &Bound<'_, PyDict>, info: &EffectInfo) -> PyResult<()> {
+    let py = out.py();
+    let resembles = info.resembles.map(|r| resembles(py, &r)).transpose()?;
+    out.set_item("resembles", resembles)?;
+    out.set_item(
+        "plainer",
+        info.plainer.map(|p| plainer(py, &p)).transpose()?,
+    )?;
+    let begun = info.begun_from.map(|b| begun_from(py, &b)).transpose()?;
+    out.set_item("begun_from", begun)?;
+    out.set_item("later", info.later.map(|l| later(py, &l)).transpose()?)?;
+    out.set_item("law_of", info.law_of.map(|l| word(&l)))?;
+    out.set_item("formula", formula(py, &info.formula)?)?;
+    out.set_item("spring", info.spring.map(|s| spring(py, &s)).transpose()?)?;
+    out.set_item("scales", info.scales.map(|s| word(&s)))
+}
+
+fn resembles<'py>(py: Python<'py>, r: &Resembles) -> PyResult<Bound<'py, PyDict>> {
+    let row = PyDict::new(py);
+    row.set_item("law", r.law)?;
+    row.set_item("size", r.size)?;
+    row.set_item("ratio", r.ratio)?;
+    row.set_item("shape", r.shape.to_vec())?;
+    row.set_item("rarer", r.rarer)?;
+    Ok(row)
+}
+
+fn plainer<'py>(py: Python<'py>, p: &Plainer) -> PyResult<Bound<'py, PyDict>> {
+    let row = PyDict::new(py);
+    row.set_item("law", p.law)?;
+    row.set_item("adds", p.adds.to_vec())?;
+    row.set_item("likelier", p.likelier)?;
+    row.set_item("shown", word(&p.shown))?;
+    Ok(row)
+}
+
+fn begun_from<'py>(py: Python<'py>, b: &BegunFrom) -> PyResult<Bound<'py, PyDict>> {
+    let row = PyDict::new(py);
+    row.set_item("law", b.law)?;
+    row.set_item("takes", b.takes.to_vec())?;
+    Ok(row)
+}
+
+fn later<'py>(py: Python<'py>, l: &Later) -> PyResult<Bound<'py, PyDict>> {
+    let row = PyDict::new(py);
+    row.set_item("amplitude", l.amplitude)?;
+    row.set_item("begin", l.begin)?;
+    row.set_item("most", l.most)?;
+    row.set_item("shape", l.shape)?;
+    row.set_item("as_of", l.as_of)?;
+    Ok(row)
+}
+
+fn formula<'py>(py: Python<'py>, f: &Formula) -> PyResult<Bound<'py, PyDict>> {
+    let row = PyDict::new(py);
+    row.set_item("kind", f.kind.map(|kind| word(&kind)))?;
+    row.set_item("error", f.error)?;
+    row.set_item("held", word(&f.held))?;
+    row.set_item("white", f.white)?;
+    row.set_item("value_error", f.value_error)?;
+    row.set_item("of_each", f.of_each)?;
+    Ok(row)
+}
+
+fn spring<'py>(py: Python<'py>, s: &SpringChange) -> PyResult<Bound<'py, PyDict>> {
+    let row = PyDict::new(py);
+    let sums: Vec<_> = s.sums.iter().map(|names| names.to_vec()).collect();
+    row.set_item("sums", sums)?;
+    row.set_item("without_middle", s.without_middle)?;
+    Ok(row)
 }
 
 /// A variant without fields as Python names it: `TorquePath` is `torque_path`.

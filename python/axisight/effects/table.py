@@ -10,7 +10,15 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from axisight import _core
+from axisight.effects.kin import BegunFrom, Formula, Later, Plainer, Resembles, SpringChange
 from axisight.errors import InputError
+
+Mark = Literal["optional", "place", "notation", "fastest_time", "shows_inverse", "held_first"]
+"""What else is to be known of a parameter.
+
+It may be idle, of several; it says where an effect acts and is no number of it; it is how somebody writes a law; a
+time [s] that fixed steps follow no less than one of; its inverse is what shows; it is held in first fits.
+"""
 
 
 @dataclass(frozen=True)
@@ -19,7 +27,7 @@ class EffectParameter:
 
     ``role``: the effect vanishes when every ``"amplitude"`` is at its neutral
     value; a ``"shape"`` may then be anything. ``lower`` and ``upper`` bound the
-    value, ``typical`` is its natural scale; all in ``unit``.
+    value, ``typical`` is its natural scale; all in ``unit``. ``marks``: what else is to be known of it.
     """
 
     name: str
@@ -29,6 +37,7 @@ class EffectParameter:
     lower: float
     upper: float
     typical: float
+    marks: tuple[Mark, ...]
 
 
 @dataclass(frozen=True)
@@ -37,11 +46,16 @@ class EffectInfo:
 
     ``family`` is the kind of cause. ``contains`` names the effects that this one becomes at some
     value of its parameters, ``parts`` simpler ones that together do what it does. ``usual``: effects
-    met more often that this one looks like where speed, load or pose hardly change. ``twins``: effects of
-    which a machine gives the very same logs of commands and motor angles.
+    met more often that this one looks like where speed, load or pose hardly change, ``usual_odds`` how many times
+    as often this one is met, where it is the usual one. ``twins``: effects of
+    which a machine gives the very same logs of commands and motor angles, ``twins_alone``: of an axis alone.
+    ``resembles``, ``plainer``, ``begun_from``, ``later``, ``formula``, ``spring``: `axisight.effects.kin`.
+    ``law_of``: what it is a law of, if an axis has one of that. ``scales``: whose torques it changes as another
+    unit of torque would, its own, those of all that carries its axis, or every axis'.
     ``stands_for``: quantity of the robot's joint that the effect changes, and whether its first
     parameter is the change itself or a share. ``linear``: how a linear model holds it.
-    ``inverse_dynamics``: whether torque predicted from measured motion can hold it.
+    ``inverse_dynamics``: whether torque predicted from measured motion can hold it; ``beside``: causes of its axis
+    without which that does not show it for sure. ``unrepeatable``: no two runs repeat what it does, it is noise.
     ``absorbed_by``: identified quantities that it is part of. ``shown_by``: experiments that tell it from
     others, the best first.
     """
@@ -68,10 +82,22 @@ class EffectInfo:
     contains: tuple[str, ...]
     parts: tuple[str, ...]
     usual: tuple[str, ...]
+    usual_odds: float
     twins: tuple[str, ...]
+    twins_alone: bool
+    resembles: Resembles | None
+    plainer: Plainer | None
+    begun_from: BegunFrom | None
+    later: Later | None
+    law_of: Literal["gear", "dry_friction"] | None
+    formula: Formula
+    spring: SpringChange | None
+    scales: Literal["own", "carriers", "every"] | None
     stands_for: tuple[str, Literal["absolute", "relative"]] | None
     linear: Literal["parameters", "slope", "path", "waves", "no"]
     inverse_dynamics: bool
+    beside: tuple[str, ...]
+    unrepeatable: bool
     absorbed_by: tuple[str, ...]
     shown_by: tuple[str, ...]
     parameters: tuple[EffectParameter, ...]
@@ -81,6 +107,10 @@ class EffectInfo:
         """Effects that become this one at some value of their parameters."""
         return tuple(e.name for e in effect_table().values() if self.name in e.contains)
 
+    def marked(self, mark: Mark) -> tuple[str, ...]:
+        """Return the names of the parameters with a mark."""
+        return tuple(p.name for p in self.parameters if mark in p.marks)
+
     def terms(self) -> dict[str, tuple[str, str, str]]:
         """Return order, cosine and sine parameter of numbered harmonic terms, by their number."""
         names = [p.name for p in self.parameters]
@@ -89,20 +119,41 @@ class EffectInfo:
         return {k: (order, cosine, sine) for k, (order, cosine, sine) in waves.items()}
 
 
-_TUPLES = ("contains", "parts", "usual", "twins", "absorbed_by", "shown_by")
+_TUPLES = ("contains", "parts", "usual", "twins", "beside", "absorbed_by", "shown_by")
 
 
 @cache
 def effect_table() -> Mapping[str, EffectInfo]:
     """Return every effect by name, in the order of the documentation."""
-    table = {}
-    for row in _core.effect_table():
-        # The core's words are those of the class: a test compares them.
-        rest: dict[str, Any] = dict(row)
-        rest |= {k: tuple(rest[k]) for k in _TUPLES}
-        rest["parameters"] = tuple(EffectParameter(**p) for p in row["parameters"])
-        table[row["name"]] = EffectInfo(**rest)
-    return MappingProxyType(table)
+    return MappingProxyType({row["name"]: _info(row) for row in _core.effect_table()})
+
+
+def _info(row: _core.EffectInfo) -> EffectInfo:
+    """Return what a row of the core says."""
+    # The core's words are those of the classes: a test compares them.
+    rest: dict[str, Any] = dict(row)
+    rest |= {k: tuple(rest[k]) for k in _TUPLES}
+    rest["formula"] = Formula(**row["formula"])
+    if (like := row["resembles"]) is not None:
+        rest["resembles"] = Resembles(
+            like["law"], like["size"], like["ratio"], dict(like["shape"]), like["rarer"]
+        )
+    if (plainer := rest["plainer"]) is not None:
+        rest["plainer"] = Plainer(**{**plainer, "adds": tuple(plainer["adds"])})
+    if (begun := row["begun_from"]) is not None:
+        rest["begun_from"] = BegunFrom(begun["law"], dict(begun["takes"]))
+    if (later := row["later"]) is not None:
+        rest["later"] = Later(**later)
+    if (spring := row["spring"]) is not None:
+        sums = tuple(map(tuple, spring["sums"]))
+        rest["spring"] = SpringChange(sums, spring["without_middle"])
+    rest["parameters"] = tuple(_parameter(p) for p in row["parameters"])
+    return EffectInfo(**rest)
+
+
+def _parameter(row: _core.ParameterInfo) -> EffectParameter:
+    rest: dict[str, Any] = dict(row)
+    return EffectParameter(**{**rest, "marks": tuple(row["marks"])})
 
 
 def effect_info(name: str) -> EffectInfo:

@@ -1,6 +1,6 @@
 //! Finite bandwidth of the current loop.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -12,14 +12,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Timing,
     linear: Linear::Path,
     shown_by: &[Experiment::WideBand],
+    formula: Formula::LAG,
     parameters: &[ParameterInfo {
         name: "time_constant_s",
         unit: "s",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: 0.0,
         upper: 0.1,
         typical: 1e-3,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

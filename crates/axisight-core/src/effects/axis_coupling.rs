@@ -13,11 +13,10 @@ const fn amplitude(
     ParameterInfo {
         name,
         unit,
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower,
         upper,
         typical,
+        ..ParameterInfo::PLAIN
     }
 }
 
@@ -43,6 +42,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: -1e3,
             upper: 1e3,
             typical: 1.0,
+            ..ParameterInfo::PLAIN
         },
         SMOOTHING,
     ],

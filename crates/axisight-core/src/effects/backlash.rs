@@ -1,7 +1,7 @@
 //! Backlash: a dead zone between motor and joint.
 
 use super::formulas::{dead_zone, dead_zone_inverse};
-use super::{Absorber, Acts, Deflected, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
+use super::{Absorber, Acts, Deflected, EffectInfo, Experiment, Family, Kernel, LawOf, Mark, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -14,25 +14,26 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     inverse_dynamics: false,
     absorbed_by: &[Absorber::Backlash],
     shown_by: &[Experiment::Amplitudes],
+    law_of: Some(LawOf::Gear),
     parameters: &[
         ParameterInfo {
             name: "half_width_rad",
             unit: "rad (joint side)",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: 0.0,
             upper: 0.05,
             typical: 3e-4,
+            ..ParameterInfo::PLAIN
         },
         // Teeth that damp in contact only, or grease and seals that damp on the way too.
         ParameterInfo {
             name: "damped",
             unit: "1",
             role: Role::Shape,
-            neutral: 0.0,
             lower: 0.0,
             upper: 1.0,
             typical: 0.5,
+            marks: &[Mark::HeldFirst],
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

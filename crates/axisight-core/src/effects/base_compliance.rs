@@ -10,11 +10,10 @@ const fn compliance(name: &'static str) -> ParameterInfo {
     ParameterInfo {
         name,
         unit: "rad/Nm",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: 0.0,
         upper: 1e-3,
         typical: 2e-7,
+        ..ParameterInfo::PLAIN
     }
 }
 
@@ -39,6 +38,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.0,
             upper: 0.1,
             typical: 2e-3,
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

@@ -1,17 +1,17 @@
 //! Tilt of the base: gravity does not point where the simulator has it.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, Mark, ParameterInfo, PlantParameters, Scales, Scope};
 use axisight_scalar::Scalar;
 
 const fn angle(name: &'static str) -> ParameterInfo {
     ParameterInfo {
         name,
         unit: "rad",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -1.6,
         upper: 1.6,
         typical: 0.02,
+        marks: &[Mark::Optional],
+        ..ParameterInfo::PLAIN
     }
 }
 
@@ -26,6 +26,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Parameters,
     absorbed_by: &[Absorber::Links, Absorber::TorqueOffset],
     shown_by: &[Experiment::Poses],
+    formula: Formula::CONSTANT,
+    scales: Some(Scales::Every),
     parameters: &[angle("about_x_rad"), angle("about_y_rad")],
     ..EffectInfo::PLAIN
 };

@@ -1,6 +1,6 @@
 //! Stiffness of cables and hoses along the joint.
 
-use super::{Acts, EffectInfo, Experiment, Family, Joint, Kernel, Linear, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Joint, Kernel, Linear, Mark, ParameterInfo, Plainer, Shown};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -12,24 +12,31 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Load,
     linear: Linear::Slope,
     shown_by: &[Experiment::Poses],
+    formula: Formula::LINEAR,
+    // A cable that hardly pulls harder as it is stretched, and is at rest far away, pulls like a constant.
+    plainer: Some(Plainer {
+        law: "torque_offset",
+        adds: &["stiffness_nm_rad"],
+        likelier: 50.0,
+        shown: Shown::Sizes,
+    }),
     parameters: &[
         ParameterInfo {
             name: "stiffness_nm_rad",
             unit: "Nm/rad (joint side)",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: -1e7,
             upper: 1e7,
             typical: 500.0,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "at_zero_nm",
             unit: "Nm (joint side)",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: -1e7,
             upper: 1e7,
             typical: 100.0,
+            marks: &[Mark::Optional],
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

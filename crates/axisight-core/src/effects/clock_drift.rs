@@ -1,6 +1,6 @@
 //! Controller and logger that run on clocks of their own.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, Scope};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, ParameterInfo, Scope};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -13,14 +13,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Timing,
     inverse_dynamics: false,
     shown_by: &[Experiment::References],
+    formula: Formula::LAG,
     parameters: &[ParameterInfo {
         name: "relative_rate",
         unit: "1",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -0.01,
         upper: 0.01,
         typical: 1e-3,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

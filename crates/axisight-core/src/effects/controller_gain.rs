@@ -1,17 +1,17 @@
 //! Gains of the machine's controller that are not the stated ones.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Mark, ParameterInfo};
 use axisight_scalar::Scalar;
 
 const fn change(name: &'static str) -> ParameterInfo {
     ParameterInfo {
         name,
         unit: "1",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -0.95,
         upper: 10.0,
         typical: 0.2,
+        marks: &[Mark::Optional],
+        ..ParameterInfo::PLAIN
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::formulas::smoothed_sign;
 use super::sides::{ARM_SHARE, Friction, on_sides};
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, SMOOTHING};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, ParameterInfo, SMOOTHING};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -14,15 +14,16 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Friction,
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Speeds],
+    formula: Formula::FRICTION,
+    law_of: Some(LawOf::DryFriction),
     parameters: &[
         ParameterInfo {
             name: "coulomb_nm",
             unit: "Nm",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: 0.0,
             upper: 1e4,
             typical: 0.5,
+            ..ParameterInfo::PLAIN
         },
         SMOOTHING,
         ARM_SHARE,

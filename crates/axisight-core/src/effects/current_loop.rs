@@ -1,6 +1,6 @@
 //! A current loop of second order.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, Resembles, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -13,15 +13,24 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &["actuator_bandwidth"],
     linear: Linear::Path,
     shown_by: &[Experiment::WideBand],
+    formula: Formula::LAG,
+    // Well damped, a delay of 2 D T up to the third power of frequency. Loops are as frequent as delays, and half of
+    // them are not damped like one.
+    resembles: Some(Resembles {
+        law: "input_delay",
+        size: "time_constant_s",
+        ratio: std::f64::consts::SQRT_2,
+        shape: &[("damping", std::f64::consts::FRAC_1_SQRT_2)],
+        rarer: 2.0,
+    }),
     parameters: &[
         ParameterInfo {
             name: "time_constant_s",
             unit: "s",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: 0.0,
             upper: 0.1,
             typical: 1e-3,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "damping",
@@ -31,6 +40,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.1,
             upper: 0.95,
             typical: 0.7,
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

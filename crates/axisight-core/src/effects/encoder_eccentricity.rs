@@ -1,17 +1,16 @@
 //! Encoder on the joint whose disc is not centred.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo};
 use axisight_scalar::Scalar;
 
 const fn wave(name: &'static str) -> ParameterInfo {
     ParameterInfo {
         name,
         unit: "rad (joint side)",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -0.5,
         upper: 0.5,
         typical: 2e-2,
+        ..ParameterInfo::PLAIN
     }
 }
 

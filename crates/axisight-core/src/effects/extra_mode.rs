@@ -18,11 +18,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         ParameterInfo {
             name: "inertia_kg_m2",
             unit: "kg m^2 (joint side)",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: 0.0,
             upper: 1e6,
             typical: 20.0,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "frequency_hz",
@@ -32,6 +31,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.5,
             upper: 200.0,
             typical: 15.0,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "damping",
@@ -41,6 +41,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 1e-3,
             upper: 1.0,
             typical: 0.05,
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

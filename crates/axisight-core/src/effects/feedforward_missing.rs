@@ -1,17 +1,16 @@
 //! Torque that the machine's controller feeds forward and the simulator's does not.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo};
 use axisight_scalar::Scalar;
 
 const fn share(name: &'static str, unit: &'static str, typical: f64) -> ParameterInfo {
     ParameterInfo {
         name,
         unit,
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -1e3,
         upper: 1e3,
         typical,
+        ..ParameterInfo::PLAIN
     }
 }
 

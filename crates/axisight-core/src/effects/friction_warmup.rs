@@ -1,6 +1,6 @@
 //! Viscous friction that changes while the gear warms up.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Motor, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Motor, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -12,15 +12,16 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Friction,
     contains: &["viscous_friction"],
     shown_by: &[Experiment::Speeds],
+    formula: Formula::FRICTION,
+    beside: &["viscous_friction"],
     parameters: &[
         ParameterInfo {
             name: "viscous_nm_s_rad",
             unit: "Nm s/rad",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: -1e4,
             upper: 1e4,
             typical: 0.05,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "time_constant_s",
@@ -30,16 +31,16 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.1,
             upper: 1e5,
             typical: 0.5,
+            ..ParameterInfo::PLAIN
         },
         // F_0: a machine that is warm as modelled begins with more.
         ParameterInfo {
             name: "cold_nm_s_rad",
             unit: "Nm s/rad",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: -1e4,
             upper: 1e4,
             typical: 0.05,
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

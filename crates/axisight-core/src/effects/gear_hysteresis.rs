@@ -1,6 +1,6 @@
 //! Gear hysteresis: a spring beside the gear's own slips, and remembers.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, Spring};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, LawOf, ParameterInfo, Role, Spring, SpringChange};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -13,15 +13,16 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     inverse_dynamics: false,
     absorbed_by: &[Absorber::Stiffness, Absorber::Damping],
     shown_by: &[Experiment::Amplitudes],
+    law_of: Some(LawOf::Gear),
+    spring: Some(SpringChange { sums: &[&["share"]], without_middle: "backlash" }),
     parameters: &[
         ParameterInfo {
             name: "share",
             unit: "1",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: 0.0,
             upper: 10.0,
             typical: 0.3,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "deflection_rad",
@@ -31,16 +32,17 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 1e-6,
             upper: 1.0,
             typical: 3e-4,
+            ..ParameterInfo::PLAIN
         },
         // Of a stiffness measured with small motions all, of one measured with large ones nothing.
         ParameterInfo {
             name: "included",
             unit: "1",
             role: Role::Shape,
-            neutral: 0.0,
             lower: -0.5,
             upper: 1.5,
             typical: 0.5,
+            ..ParameterInfo::PLAIN
         },
         // How suddenly each element slips, and how far apart they do: the more, the less small loops creep
         // under a load.
@@ -48,20 +50,20 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             name: "sharpness",
             unit: "1",
             role: Role::Shape,
-            neutral: 0.0,
             lower: 0.0,
             upper: 1.0,
             typical: 0.5,
+            ..ParameterInfo::PLAIN
         },
         // What it remembers of the motion before a run.
         ParameterInfo {
             name: "strain_at_rest",
             unit: "1",
             role: Role::Shape,
-            neutral: 0.0,
             lower: -1.0,
             upper: 1.0,
             typical: 0.5,
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

@@ -1,6 +1,6 @@
 //! Torque of a gravity balancer on the joint.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Joint, Kernel, Linear, ParameterInfo, Role};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Joint, Kernel, Linear, Mark, ParameterInfo, Scales};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -13,24 +13,25 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Slope,
     absorbed_by: &[Absorber::Links],
     shown_by: &[Experiment::Poses],
+    formula: Formula::RIGID_BODY,
+    scales: Some(Scales::Own),
     parameters: &[
         ParameterInfo {
             name: "sine_nm",
             unit: "Nm (joint side)",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: -1e6,
             upper: 1e6,
             typical: 1e3,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "cosine_nm",
             unit: "Nm (joint side)",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: -1e6,
             upper: 1e6,
             typical: 1e3,
+            marks: &[Mark::Optional],
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

@@ -1,6 +1,6 @@
 //! Transport delay between commanded and applied torque.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -13,14 +13,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     twins: &["sensor_delay"],
     linear: Linear::Path,
     shown_by: &[Experiment::WideBand],
+    formula: Formula::LAG,
+    twins_alone: true,
     parameters: &[ParameterInfo {
         name: "delay_s",
         unit: "s",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: 0.0,
         upper: 0.05,
         typical: 1e-3,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

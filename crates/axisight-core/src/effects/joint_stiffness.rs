@@ -1,6 +1,6 @@
 //! Gear stiffness other than the simulator's.
 
-use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, StandsFor};
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, Linear, Mark, ParameterInfo, PlantParameters, StandsFor};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -15,14 +15,16 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     inverse_dynamics: false,
     absorbed_by: &[Absorber::Stiffness],
     shown_by: &[Experiment::Amplitudes],
+    formula: Formula::LINEAR,
+    law_of: Some(LawOf::Gear),
     parameters: &[ParameterInfo {
         name: "relative_change",
         unit: "1",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -0.9,
         upper: 5.0,
         typical: 0.2,
+        marks: &[Mark::ShowsInverse],
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

@@ -1,6 +1,6 @@
 //! Zero of a joint angle other than the simulator's: the arm beyond stands turned.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, PlantParameters, Scales};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -13,14 +13,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Parameters,
     absorbed_by: &[Absorber::Links, Absorber::TorqueOffset],
     shown_by: &[Experiment::Poses],
+    formula: Formula::CONSTANT,
+    scales: Some(Scales::Every),
     parameters: &[ParameterInfo {
         name: "offset_rad",
         unit: "rad (joint side)",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -1.6,
         upper: 1.6,
         typical: 0.02,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

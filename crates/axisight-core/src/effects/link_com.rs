@@ -1,6 +1,6 @@
 //! Centre of mass of one link other than the simulator's.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, PlantParameters, shift};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, PlantParameters, Scales, shift};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -14,6 +14,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Parameters,
     absorbed_by: &[Absorber::Links],
     shown_by: &[Experiment::Poses],
+    formula: Formula::RIGID_BODY,
+    scales: Some(Scales::Carriers),
     parameters: &[shift("x_m"), shift("y_m"), shift("z_m")],
     ..EffectInfo::PLAIN
 };

@@ -1,6 +1,6 @@
 //! Inertia of one link other than the simulator's.
 
-use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, StandsFor};
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, PlantParameters, Scales, StandsFor};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -15,14 +15,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Parameters,
     absorbed_by: &[Absorber::Links],
     shown_by: &[Experiment::Poses],
+    formula: Formula::RIGID_BODY,
+    scales: Some(Scales::Carriers),
     parameters: &[ParameterInfo {
         name: "relative_change",
         unit: "1",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -0.95,
         upper: 20.0,
         typical: 0.1,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

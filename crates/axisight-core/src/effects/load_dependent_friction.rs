@@ -1,7 +1,7 @@
 //! Coulomb friction in proportion to the gear load.
 
 use super::formulas::smoothed_sign;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Motor, ParameterInfo, Role, SMOOTHING};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Motor, ParameterInfo, SMOOTHING};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -14,15 +14,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     usual: &["coulomb_friction"],
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Speeds],
+    formula: Formula::FRICTION,
     parameters: &[
         ParameterInfo {
             name: "coefficient",
             unit: "1",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: 0.0,
             upper: 2.0,
             typical: 0.05,
+            ..ParameterInfo::PLAIN
         },
         SMOOTHING,
     ],

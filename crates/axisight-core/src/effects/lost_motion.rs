@@ -1,6 +1,6 @@
 //! Gear that gives way around its middle: play that carries part of the torque.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, Spring};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, LawOf, ParameterInfo, Role, Spring, SpringChange};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -13,16 +13,17 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     usual: &["backlash", "nonlinear_stiffness"],
     inverse_dynamics: false,
     shown_by: &[Experiment::Amplitudes],
+    law_of: Some(LawOf::Gear),
+    spring: Some(SpringChange { sums: &[&["softness"]], without_middle: "backlash" }),
     parameters: &[
         ParameterInfo {
             name: "softness",
             unit: "1",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: 0.0,
             // All but play, which a spring at rest could not carry a load with.
             upper: 0.98,
             typical: 0.5,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "half_width_rad",
@@ -32,6 +33,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 1e-6,
             upper: 0.05,
             typical: 3e-4,
+            ..ParameterInfo::PLAIN
         },
         // Teeth come into contact one after another, or all at once.
         ParameterInfo {
@@ -42,6 +44,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.02,
             upper: 3.0,
             typical: 0.3,
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

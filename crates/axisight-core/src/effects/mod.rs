@@ -9,9 +9,10 @@ mod harmonics;
 mod sides;
 
 pub use axisight_plant::effect::{
-    Absorber, Acts, Arm, AxisTorque, BaseJoint, Change, CoupledAxis, Deflected, EffectError,
-    EffectInfo, Experiment, Family, GearError, Joint, Kernel, Linear, Motor, Pair, ParameterInfo,
-    PlantParameters, Role, Scope, Spring, StandsFor,
+    Absorber, Acts, Arm, AxisTorque, BaseJoint, BegunFrom, Change, CoupledAxis, Deflected,
+    EffectError, EffectInfo, Experiment, Family, Formula, FormulaKind, GearError, Held, Joint,
+    Kernel, Later, LawOf, Linear, Mark, Motor, Pair, ParameterInfo, Plainer, PlantParameters,
+    Resembles, Role, Scales, Scope, Shown, Spring, SpringChange, StandsFor,
 };
 pub use axisight_plant::formulas;
 
@@ -26,6 +27,8 @@ const SMOOTHING: ParameterInfo = ParameterInfo {
     lower: 1e-5,
     upper: 50.0,
     typical: 0.1,
+    marks: &[Mark::Notation],
+    ..ParameterInfo::PLAIN
 };
 
 /// Speed of the motor over which a dry friction falls from standstill.
@@ -37,6 +40,7 @@ const STRIBECK_SPEED: ParameterInfo = ParameterInfo {
     lower: 1e-4,
     upper: 500.0,
     typical: 3.0,
+    ..ParameterInfo::PLAIN
 };
 
 /// How far something lies elsewhere in its link, along one axis of its frame.
@@ -44,11 +48,11 @@ const fn shift(name: &'static str) -> ParameterInfo {
     ParameterInfo {
         name,
         unit: "m (frame of the link)",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -2.0,
         upper: 2.0,
         typical: 0.05,
+        marks: &[Mark::Optional],
+        ..ParameterInfo::PLAIN
     }
 }
 

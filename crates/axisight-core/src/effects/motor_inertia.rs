@@ -1,6 +1,6 @@
 //! Motor inertia other than the simulator's.
 
-use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, StandsFor};
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, PlantParameters, Scales, StandsFor};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -14,14 +14,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Parameters,
     absorbed_by: &[Absorber::MotorInertia],
     shown_by: &[Experiment::Poses],
+    formula: Formula::RIGID_BODY,
+    scales: Some(Scales::Own),
     parameters: &[ParameterInfo {
         name: "relative_change",
         unit: "1",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -0.9,
         upper: 10.0,
         typical: 0.2,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

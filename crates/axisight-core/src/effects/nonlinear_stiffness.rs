@@ -1,7 +1,7 @@
 //! Gear stiffness that changes with load.
 
 use super::formulas::spring_torque;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role, Spring};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, Linear, ParameterInfo, Spring};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -15,14 +15,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     inverse_dynamics: false,
     absorbed_by: &[Absorber::Stiffness],
     shown_by: &[Experiment::Amplitudes],
+    formula: Formula::LINEAR,
+    law_of: Some(LawOf::Gear),
     parameters: &[ParameterInfo {
         name: "cubic_nm_rad3",
         unit: "Nm/rad^3",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -1e14,
         upper: 1e14,
         typical: 1e11,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

@@ -1,6 +1,6 @@
 //! A point mass on the last link that carries mass.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, Scope};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, Mark, ParameterInfo, PlantParameters, Role, Scales, Scope};
 use crate::robot::Body;
 use axisight_scalar::Scalar;
 
@@ -13,6 +13,8 @@ const fn coordinate(name: &'static str, neutral: f64) -> ParameterInfo {
         lower: -3.0,
         upper: 3.0,
         typical: 0.5,
+        marks: &[Mark::Optional],
+        ..ParameterInfo::PLAIN
     }
 }
 
@@ -27,15 +29,18 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Parameters,
     absorbed_by: &[Absorber::Links],
     shown_by: &[Experiment::Poses],
+    formula: Formula::RIGID_BODY,
+    scales: Some(Scales::Carriers),
+    // A load, which every arm is there to carry, beside a link that is not as it was drawn: the link stands beside it.
+    usual_odds: 3.0,
     parameters: &[
         ParameterInfo {
             name: "mass_kg",
             unit: "kg",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: -1e4,
             upper: 1e4,
             typical: 30.0,
+            ..ParameterInfo::PLAIN
         },
         coordinate("x_m", 1.0),
         coordinate("y_m", 0.0),

@@ -1,7 +1,7 @@
 //! Gear stiffness that takes one value at small loads and another at large ones.
 
 use super::formulas::dead_zone;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, Spring};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, LawOf, ParameterInfo, Plainer, Role, Shown, Spring, SpringChange};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -15,25 +15,32 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     inverse_dynamics: false,
     absorbed_by: &[Absorber::Stiffness],
     shown_by: &[Experiment::Amplitudes],
+    law_of: Some(LawOf::Gear),
+    spring: Some(SpringChange { sums: &[&["within"], &["within", "step"]], without_middle: "backlash" }),
+    // A knee that nothing reaches, or all pass.
+    plainer: Some(Plainer {
+        law: "joint_stiffness",
+        adds: &["step", "knee_rad"],
+        likelier: 10.0,
+        shown: Shown::Sizes,
+    }),
     parameters: &[
         ParameterInfo {
             name: "step",
             unit: "1",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: -0.95,
             upper: 5.0,
             typical: 0.3,
+            ..ParameterInfo::PLAIN
         },
         // Of a stiffness measured with large motions, or with others than the robot makes.
         ParameterInfo {
             name: "within",
             unit: "1",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: -0.95,
             upper: 5.0,
             typical: 0.3,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "knee_rad",
@@ -43,6 +50,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 1e-6,
             upper: 0.1,
             typical: 3e-4,
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

@@ -1,18 +1,17 @@
 //! Dry friction that changes with the position of the axis.
 
 use super::sides::{ARM_SHARE, Friction, on_sides};
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, SMOOTHING};
+use super::{Absorber, Acts, BegunFrom, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, Mark, ParameterInfo, Role, SMOOTHING};
 use axisight_scalar::Scalar;
 
 const fn wave(name: &'static str) -> ParameterInfo {
     ParameterInfo {
         name,
         unit: "Nm",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -1e4,
         upper: 1e4,
         typical: 0.2,
+        ..ParameterInfo::PLAIN
     }
 }
 
@@ -27,8 +26,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     usual: &["coulomb_friction"],
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Poses],
+    formula: Formula::FRICTION,
+    law_of: Some(LawOf::DryFriction),
+    // A law that holds one which is the same everywhere cannot leave more than it.
+    begun_from: Some(BegunFrom {
+        law: "coulomb_friction",
+        takes: &[("coulomb_nm", "mean_nm"), ("smoothing_rad_s", "smoothing_rad_s"), ("arm_share", "arm_share")],
+    }),
     parameters: &[
-        wave("cosine_nm"),
+        ParameterInfo { marks: &[Mark::Optional], ..wave("cosine_nm") },
         wave("sine_nm"),
         ParameterInfo {
             name: "order",
@@ -38,6 +44,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 1e-4,
             upper: 100.0,
             typical: 0.01,
+            ..ParameterInfo::PLAIN
         },
         SMOOTHING,
         wave("mean_nm"),

@@ -1,6 +1,6 @@
 //! Encoder of few lines: positions come in steps.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -12,14 +12,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     family: Family::Sensor,
     inverse_dynamics: false,
     shown_by: &[Experiment::SlowTurns],
+    unrepeatable: true,
     parameters: &[ParameterInfo {
         name: "increment_rad",
         unit: "rad",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: 0.0,
         upper: 1.0,
         typical: 1.5e-3,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

@@ -17,11 +17,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         ParameterInfo {
             name: "sag_1_w",
             unit: "1/W",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: 0.0,
             upper: 10.0,
             typical: 6e-3,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "curvature",
@@ -31,6 +30,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.0,
             upper: 1.0,
             typical: 0.5,
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

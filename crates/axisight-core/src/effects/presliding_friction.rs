@@ -1,7 +1,7 @@
 //! Presliding friction: bristles that bend before the surfaces slip.
 
 use super::formulas::stribeck_level;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Motor, ParameterInfo, Role, STRIBECK_SPEED};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Later, LawOf, Mark, Motor, ParameterInfo, Plainer, Role, STRIBECK_SPEED, Shown};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -14,15 +14,31 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &["coulomb_friction"],
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Speeds],
+    formula: Formula::FRICTION,
+    law_of: Some(LawOf::DryFriction),
+    // Whoever writes dry friction rounds its corner over speed or over a small way; where it yields its way is sure.
+    plainer: Some(Plainer {
+        law: "coulomb_friction",
+        adds: &["presliding_rad"],
+        likelier: 10.0,
+        shown: Shown::Sizes,
+    }),
+    // How friction falls once it slips shows only beside how it yields before.
+    later: Some(Later {
+        amplitude: "static_ratio",
+        begin: 1.3,
+        most: 5.0,
+        shape: "stribeck_speed_rad_s",
+        as_of: "stribeck_friction",
+    }),
     parameters: &[
         ParameterInfo {
             name: "coulomb_nm",
             unit: "Nm",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: 0.0,
             upper: 1e4,
             typical: 0.5,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "static_ratio",
@@ -32,6 +48,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.1,
             upper: 10.0,
             typical: 1.5,
+            ..ParameterInfo::PLAIN
         },
         STRIBECK_SPEED,
         ParameterInfo {
@@ -42,6 +59,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 1e-9,
             upper: 10.0,
             typical: 1e-3,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "bristle_time_s",
@@ -51,6 +69,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.0,
             upper: 1.0,
             typical: 1e-4,
+            ..ParameterInfo::PLAIN
         },
         // T_r: none in the paper. With one, no bristle slips faster, and a fixed step that is not
         // much longer follows.
@@ -58,10 +77,11 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             name: "relaxation_s",
             unit: "s",
             role: Role::Shape,
-            neutral: 0.0,
             lower: 0.0,
             upper: 1.0,
             typical: 1e-4,
+            marks: &[Mark::FastestTime],
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

@@ -1,6 +1,6 @@
 //! Drag that grows with the square of the speed.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Motor, ParameterInfo, Role};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Motor, ParameterInfo};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -13,14 +13,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     usual: &["viscous_friction"],
     absorbed_by: &[Absorber::ViscousFriction],
     shown_by: &[Experiment::Speeds],
+    formula: Formula::FRICTION,
     parameters: &[ParameterInfo {
         name: "drag_nm_s2_rad2",
         unit: "Nm s^2/rad^2",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -1e3,
         upper: 1e3,
         typical: 1e-3,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

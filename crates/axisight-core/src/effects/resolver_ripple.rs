@@ -1,7 +1,7 @@
 //! Resolver error over the motor angle.
 
 use super::harmonics::{Harmonics, harmonic_parameters};
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -15,6 +15,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     inverse_dynamics: false,
     shown_by: &[Experiment::SlowTurns],
     // An order of zero switches a term off.
+    formula: Formula::LINEAR,
     parameters: harmonic_parameters!(
         "rad" 0.5 1e-3 "order_1" "cosine_1_rad" "sine_1_rad" 1.0,
         "rad" 0.5 1e-3 "order_2" "cosine_2_rad" "sine_2_rad" 0.0,

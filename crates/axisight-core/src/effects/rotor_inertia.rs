@@ -1,6 +1,6 @@
 //! Motors whose inertia the simulator leaves out.
 
-use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, PlantParameters, Role, StandsFor};
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, PlantParameters, Scales, StandsFor};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -15,14 +15,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Parameters,
     absorbed_by: &[Absorber::MotorInertia],
     shown_by: &[Experiment::Poses],
+    formula: Formula::RIGID_BODY,
+    scales: Some(Scales::Carriers),
     parameters: &[ParameterInfo {
         name: "inertia_kg_m2",
         unit: "kg m^2",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: 0.0,
         upper: 1e5,
         typical: 0.01,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

@@ -1,6 +1,6 @@
 //! Transport delay of the position that the controller reads.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, input_delay};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, input_delay};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -14,6 +14,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     twins: &["input_delay"],
     inverse_dynamics: false,
     shown_by: &[Experiment::WideBand],
+    formula: Formula::LAG,
+    twins_alone: true,
     parameters: input_delay::INFO.parameters,
     ..EffectInfo::PLAIN
 };

@@ -1,6 +1,6 @@
 //! Dry friction on both sides of an elastic gear.
 
-use super::{Joint, Kernel, Motor, ParameterInfo, Role};
+use super::{Joint, Kernel, Mark, Motor, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 /// Share of a friction that the arm feels, behind the gear.
@@ -8,10 +8,11 @@ pub(super) const ARM_SHARE: ParameterInfo = ParameterInfo {
     name: "arm_share",
     unit: "1",
     role: Role::Shape,
-    neutral: 0.0,
     lower: 0.0,
     upper: 1.0,
     typical: 0.5,
+    marks: &[Mark::Place],
+    ..ParameterInfo::PLAIN
 };
 
 /// A friction without a memory.

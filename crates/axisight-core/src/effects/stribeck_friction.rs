@@ -2,7 +2,7 @@
 
 use super::formulas::{smoothed_sign, stribeck_level};
 use super::sides::{ARM_SHARE, Friction, on_sides};
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, SMOOTHING, STRIBECK_SPEED};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, ParameterInfo, Plainer, SMOOTHING, STRIBECK_SPEED, Shown};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -15,24 +15,31 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     contains: &["coulomb_friction"],
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Speeds],
+    formula: Formula::FRICTION,
+    law_of: Some(LawOf::DryFriction),
+    // An excess that never shows, as the sign turns over a wider range of speeds, takes up how a corner is rounded.
+    plainer: Some(Plainer {
+        law: "coulomb_friction",
+        adds: &["excess_nm", "stribeck_speed_rad_s"],
+        likelier: 10.0,
+        shown: Shown::Rise,
+    }),
     parameters: &[
         ParameterInfo {
             name: "coulomb_nm",
             unit: "Nm",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: 0.0,
             upper: 1e4,
             typical: 0.5,
+            ..ParameterInfo::PLAIN
         },
         ParameterInfo {
             name: "excess_nm",
             unit: "Nm",
-            role: Role::Amplitude,
-            neutral: 0.0,
             lower: 0.0,
             upper: 1e4,
             typical: 0.3,
+            ..ParameterInfo::PLAIN
         },
         STRIBECK_SPEED,
         SMOOTHING,

@@ -1,6 +1,6 @@
 //! Torque constant other than the drive believes.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -13,14 +13,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Path,
     absorbed_by: &[Absorber::Torque],
     shown_by: &[Experiment::Poses],
+    formula: Formula::CONSTANT,
     parameters: &[ParameterInfo {
         name: "relative_error",
         unit: "1",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -0.8,
         upper: 2.0,
         typical: 0.05,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

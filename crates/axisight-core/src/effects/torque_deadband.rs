@@ -1,6 +1,6 @@
 //! Deadband of the drive.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -17,11 +17,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     parameters: &[ParameterInfo {
         name: "width_nm",
         unit: "Nm",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: 0.0,
         upper: 1e4,
         typical: 0.3,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

@@ -1,6 +1,6 @@
 //! Constant torque error.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, Linear, ParameterInfo, Role};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -14,14 +14,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Path,
     absorbed_by: &[Absorber::TorqueOffset],
     shown_by: &[Experiment::Poses],
+    formula: Formula::CONSTANT,
     parameters: &[ParameterInfo {
         name: "offset_nm",
         unit: "Nm",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -1e4,
         upper: 1e4,
         typical: 0.5,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

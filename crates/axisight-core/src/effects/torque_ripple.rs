@@ -1,7 +1,7 @@
 //! Motor torque ripple over the motor angle.
 
 use super::harmonics::{Harmonics, harmonic_parameters};
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, Motor, ParameterInfo, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Waves { constant: 15, proportional: 3, reading: 0 },
     shown_by: &[Experiment::SlowTurns],
     // An order of zero switches a term off.
+    formula: Formula::LINEAR,
     parameters: harmonic_parameters!(
         "Nm" 1e4 0.1 "order_1" "cosine_1_nm" "sine_1_nm" 1.0,
         "Nm" 1e4 0.1 "order_2" "cosine_2_nm" "sine_2_nm" 0.0,

@@ -1,6 +1,6 @@
 //! Torque limit of the drive.
 
-use super::{Acts, EffectInfo, Family, Kernel, Linear, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Family, Formula, Kernel, Linear, ParameterInfo};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -11,14 +11,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     acts: Acts::TorquePath,
     family: Family::TorquePath,
     linear: Linear::Path,
+    formula: Formula::LINEAR,
     parameters: &[ParameterInfo {
         name: "limit_nm",
         unit: "Nm",
-        role: Role::Amplitude,
         neutral: 1e6,
         lower: 1e-3,
         upper: 1e6,
         typical: 10.0,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

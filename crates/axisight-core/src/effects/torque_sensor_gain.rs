@@ -1,6 +1,6 @@
 //! Scale of the torque that the drive reports.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -15,11 +15,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     parameters: &[ParameterInfo {
         name: "relative_error",
         unit: "1",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -0.9,
         upper: 10.0,
         typical: 0.05,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

@@ -1,6 +1,6 @@
 //! Constant error of the torque that the drive reports.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Linear, torque_offset};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Linear, torque_offset};
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "torque_sensor_offset",
@@ -14,6 +14,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     inverse_dynamics: false,
     absorbed_by: &[Absorber::TorqueOffset],
     shown_by: &[Experiment::Poses],
+    formula: Formula::LINEAR,
     parameters: torque_offset::INFO.parameters,
     ..EffectInfo::PLAIN
 };

@@ -8,11 +8,10 @@ const fn wave(name: &'static str) -> ParameterInfo {
     ParameterInfo {
         name,
         unit: "rad (joint side)",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -0.1,
         upper: 0.1,
         typical: 2e-4,
+        ..ParameterInfo::PLAIN
     }
 }
 
@@ -34,6 +33,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.0,
             upper: 500.0,
             typical: 1.0,
+            ..ParameterInfo::PLAIN
         },
         wave("cosine_rad"),
         wave("sine_rad"),
@@ -47,6 +47,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: -1.0,
             upper: 2.0,
             typical: 1.0,
+            ..ParameterInfo::PLAIN
         },
         wave("second_cosine_rad"),
         wave("second_sine_rad"),
@@ -59,6 +60,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.0,
             upper: 500.0,
             typical: 1.0,
+            ..ParameterInfo::PLAIN
         },
     ],
     ..EffectInfo::PLAIN

@@ -1,6 +1,6 @@
 //! A filter through which the controller takes the speed.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -15,11 +15,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     parameters: &[ParameterInfo {
         name: "time_constant_s",
         unit: "s",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: 0.0,
         upper: 0.1,
         typical: 2e-3,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

@@ -1,6 +1,6 @@
 //! Viscous friction beyond the simulator's.
 
-use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Kernel, Linear, Motor, ParameterInfo, Role, StandsFor};
+use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Formula, Kernel, Linear, Motor, ParameterInfo, StandsFor};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -14,14 +14,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Slope,
     absorbed_by: &[Absorber::ViscousFriction],
     shown_by: &[Experiment::Speeds],
+    formula: Formula { value_error: Formula::LINEAR.value_error, of_each: false, ..Formula::FRICTION },
     parameters: &[ParameterInfo {
         name: "viscous_nm_s_rad",
         unit: "Nm s/rad",
-        role: Role::Amplitude,
-        neutral: 0.0,
         lower: -1e4,
         upper: 1e4,
         typical: 0.01,
+        ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN
 };

@@ -3,6 +3,9 @@
 //! Whoever has to treat effects differently asks for a property here; no other place knows
 //! them by name, but for the start values of a search.
 
+use super::formula::Formula;
+use super::kin::{BegunFrom, Later, LawOf, Plainer, Resembles, Scales, SpringChange};
+
 /// What an effect belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
@@ -152,6 +155,25 @@ pub enum Role {
     Shape,
 }
 
+/// What else is to be known of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    /// It may be idle: one coordinate, one wave, one gain of several. An effect does not pay for it where it says
+    /// nothing for it.
+    Optional,
+    /// It says where the effect acts, and counts no more than the axis does.
+    Place,
+    /// It is how somebody writes the law, not what a machine has.
+    Notation,
+    /// A time [s] over which the effect changes at the fastest: no fixed step follows less than one of its own.
+    FastestTime,
+    /// A small change of it shows as the change of its inverse: of a stiffness, as that of the compliance.
+    ShowsInverse,
+    /// Held at its neutral value until the fit of the others is where it belongs; the curve of the law at rest has
+    /// none of it.
+    HeldFirst,
+}
+
 /// One parameter of an effect.
 #[derive(Debug, Clone, Copy)]
 pub struct ParameterInfo {
@@ -170,6 +192,22 @@ pub struct ParameterInfo {
     /// Typical magnitude: natural scale of a search and width of a plausible range. It must visibly
     /// change the closed loop of the preset robot.
     pub typical: f64,
+    /// What else is to be known of it.
+    pub marks: &'static [Mark],
+}
+
+impl ParameterInfo {
+    /// What most parameters are: an amplitude without marks. Name, unit, bounds and typical size are its own.
+    pub const PLAIN: Self = Self {
+        name: "",
+        unit: "1",
+        role: Role::Amplitude,
+        neutral: 0.0,
+        lower: 0.0,
+        upper: 0.0,
+        typical: 0.0,
+        marks: &[],
+    };
 }
 
 /// Description of an effect.
@@ -196,8 +234,33 @@ pub struct EffectInfo {
     /// Effects met more often, of the same family, that this one looks like where speed, load or
     /// pose hardly change.
     pub usual: &'static [&'static str],
+    /// How many times as often as what looks like it this effect is met, where it is the usual one [1].
+    pub usual_odds: f64,
     /// Effects of which a machine gives the very same logs of commands and motor angles.
     pub twins: &'static [&'static str],
+    /// Whether it has its twins on an axis alone: others feel the motion of its axis when it is.
+    pub twins_alone: bool,
+    /// Another effect that it is like at some values of its parameters.
+    pub resembles: Option<Resembles>,
+    /// The law that it is without what it adds.
+    pub plainer: Option<Plainer>,
+    /// Law where whose fit ended its own may begin.
+    pub begun_from: Option<BegunFrom>,
+    /// Numbers of it that are looked for where its fit without them ended.
+    pub later: Option<Later>,
+    /// What it is a law of, if an axis has one of that.
+    pub law_of: Option<LawOf>,
+    /// What two formulas of it may differ by.
+    pub formula: Formula,
+    /// How it makes a gear another spring.
+    pub spring: Option<SpringChange>,
+    /// Whose torques it changes as another unit of torque would.
+    pub scales: Option<Scales>,
+    /// Causes of its axis without which torque predicted from measured motion does not show it for sure: what no
+    /// formula has of a real machine passes for it.
+    pub beside: &'static [&'static str],
+    /// Whether no two runs repeat what it does: it is noise, which no simulator removes.
+    pub unrepeatable: bool,
     /// Parameter of the robot it is a change of.
     pub stands_for: Option<StandsFor>,
     /// How a linear model holds it.
@@ -215,7 +278,8 @@ pub struct EffectInfo {
 
 impl EffectInfo {
     /// What most effects are: on one axis, held by torque predicted from measured motion and by no linear model,
-    /// akin to no other.
+    /// akin to no other, with a formula that each book writes otherwise; met four times as often as what looks
+    /// like it.
     ///
     /// An effect states what it is otherwise, `..EffectInfo::PLAIN` the rest. Of its own it states at least name,
     /// summary, equation, source, point of action, family and parameters.
@@ -230,7 +294,19 @@ impl EffectInfo {
         contains: &[],
         parts: &[],
         usual: &[],
+        usual_odds: 4.0,
         twins: &[],
+        twins_alone: false,
+        resembles: None,
+        plainer: None,
+        begun_from: None,
+        later: None,
+        law_of: None,
+        formula: Formula::LAW,
+        spring: None,
+        scales: None,
+        beside: &[],
+        unrepeatable: false,
         stands_for: None,
         linear: Linear::No,
         inverse_dynamics: true,

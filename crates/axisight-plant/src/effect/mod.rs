@@ -1,15 +1,19 @@
 //! What an effect is: what is known of it, the points where it may act, how it is misused.
 
 mod error;
+mod formula;
 mod info;
 mod kernel;
+mod kin;
 
 pub use error::EffectError;
+pub use formula::{Formula, FormulaKind, Held};
 pub use info::{
-    Absorber, Acts, Change, EffectInfo, Experiment, Family, Linear, ParameterInfo, Role, Scope,
-    StandsFor,
+    Absorber, Acts, Change, EffectInfo, Experiment, Family, Linear, Mark, ParameterInfo, Role,
+    Scope, StandsFor,
 };
 pub use kernel::{
     Arm, AxisTorque, BaseJoint, CoupledAxis, Deflected, GearError, Joint, Kernel, Motor, Pair,
     PlantParameters, Spring,
 };
+pub use kin::{BegunFrom, Later, LawOf, Plainer, Resembles, Scales, Shown, SpringChange};

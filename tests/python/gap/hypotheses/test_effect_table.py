@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from axisight import _core
-from axisight.effects import EffectInfo, effect_table
+from axisight.effects import Effect, EffectInfo, effect_table
 from axisight.gap.facts.settings import DEFAULT_TOLERANCES
 from axisight.gap.hypotheses.start_values import STARTS
+from axisight.gap.ranking.posterior import FORMULA_ERROR
 from axisight.gap.verdict.separating_advice import separating_experiment
 
 TABLE = effect_table()
@@ -36,6 +37,52 @@ def test_every_effect_has_start_values_and_no_entry_is_stray() -> None:
     pairs = enumerate(zip_longest(STARTS, TABLE, fillvalue="nothing"), start=1)
     wrong = [f"entry {i}: STARTS has {a}, mod.rs has {b}" for i, (a, b) in pairs if a != b]
     assert not wrong, wrong[0]
+
+
+@pytest.mark.parametrize("info", TABLE.values(), ids=TABLE)
+def test_what_an_effect_is_akin_to_is_in_the_table(info: EffectInfo) -> None:
+    own = {p.name for p in info.parameters}
+    if info.plainer is not None:
+        law = TABLE[info.plainer.law]
+        assert set(info.plainer.adds) <= own and info.plainer.likelier > 1
+        assert law.scope == info.scope
+    if info.resembles is not None:
+        # Of one number, which is in proportion to one of its own.
+        (p,) = TABLE[info.resembles.law].parameters
+        values = info.resembles.values(p.typical)
+        assert values.keys() == own
+        Effect(info.name, 1, values)
+    if info.begun_from is not None:
+        names = {p.name for p in TABLE[info.begun_from.law].parameters}
+        assert info.begun_from.law in info.contains
+        assert set(info.begun_from.takes) == names and set(info.begun_from.takes.values()) <= own
+    if info.later is not None:
+        later = info.later
+        assert {later.amplitude, later.shape} <= own
+        assert later.shape in {p.name for p in TABLE[later.as_of].parameters}
+        (neutral,) = (p.neutral for p in info.parameters if p.name == later.amplitude)
+        assert neutral < later.begin < later.most
+    if info.spring is not None:
+        assert {n for names in info.spring.sums for n in names} <= own
+        assert info.acts == TABLE[info.spring.without_middle].acts == "transmission"
+    # A cause beside which it is asked for is one it becomes.
+    assert set(info.beside) <= set(info.contains)
+
+
+@pytest.mark.parametrize("info", TABLE.values(), ids=TABLE)
+def test_formulas_differ_as_what_they_describe_does(info: EffectInfo) -> None:
+    formula = info.formula
+    kinds = {"timing": "lag", "friction": "friction"}
+    assert formula.kind == kinds.get(info.family, "exact" if formula.exact else None)
+    assert 0 < formula.error <= FORMULA_ERROR and 0 < formula.value_error < 0.05
+    # What a linear model holds is the same in all books, but for how a controller holds its command.
+    assert formula.of_each == (info.linear == "no" or info.family == "timing")
+    # Of an effect without a kind the error is that of formulas in general.
+    assert formula.kind is not None or formula.error == FORMULA_ERROR
+    assert (info.law_of == "gear") == (info.family == "transmission")
+    assert (info.law_of == "dry_friction") == ("coulomb_friction" in {info.name, *info.contains})
+    # What scales as a torque constant does changes bodies, weights or poses.
+    assert info.scales is None or (formula.exact and info.family in {"load", "arm"})
 
 
 @pytest.mark.parametrize("info", TABLE.values(), ids=TABLE)

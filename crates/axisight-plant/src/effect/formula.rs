@@ -1,0 +1,87 @@
+//! By how much formulas of one physical effect differ, whoever writes them.
+
+/// Effects whose formulas are held against one another by as little as these differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FormulaKind {
+    /// What is late: delays and lags.
+    Lag,
+    /// Laws of friction.
+    Friction,
+    /// Weight, inertia and constant errors of torque, which are the same in all books.
+    Exact,
+}
+
+/// Where an effect is held to the error of its formula, instead of what formulas differ by in general.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Held {
+    /// Wherever it is tried.
+    Always,
+    /// Where one of its kind leaves hardly more than noise: of a law that leaves more, it is not known what of it
+    /// the formula leaves.
+    NearNoise,
+    /// Where one of its kind leaves next to nothing of what there is to explain.
+    NextToNothing,
+}
+
+/// What two formulas of an effect may differ by.
+///
+/// Shares of the explained error that the right effect leaves, on simulated machines of other engines.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Formula {
+    /// With which others it is held apart by that; None: with none.
+    pub kind: Option<FormulaKind>,
+    /// Share of what it explains by which two formulas of it may differ [1].
+    pub error: f64,
+    /// Where that holds.
+    pub held: Held,
+    /// Whether what is left of the right one is white: a difference counts for more then.
+    pub white: bool,
+    /// Standard deviation of a parameter between formulas, as a share of its size [1].
+    pub value_error: f64,
+    /// Whether it is that for each number that is fitted: each makes up for what another formula says of the rest.
+    pub of_each: bool,
+}
+
+impl Formula {
+    /// A law that each book writes otherwise: tanh or algebraic sign, play or dead zone.
+    pub const LAW: Self = Self {
+        kind: None,
+        error: 0.02,
+        held: Held::Always,
+        white: false,
+        value_error: 0.01,
+        of_each: true,
+    };
+    /// A law whose numbers are the same in all books, and only integrators differ: springs, waves, limits.
+    pub const LINEAR: Self = Self {
+        value_error: 0.004,
+        of_each: false,
+        ..Self::LAW
+    };
+    /// A delay or lag: one to three ten-thousandths, once fits have ended. It is linear in the torque; how a
+    /// controller holds its command bends its numbers.
+    pub const LAG: Self = Self {
+        kind: Some(FormulaKind::Lag),
+        error: 3e-4,
+        white: true,
+        ..Self::LAW
+    };
+    /// A law of friction: half a thousandth, where one of them leaves hardly more than noise.
+    pub const FRICTION: Self = Self {
+        kind: Some(FormulaKind::Friction),
+        error: 5e-4,
+        held: Held::NearNoise,
+        ..Self::LAW
+    };
+    /// What changes a rigid body or its weight: less than a ten-thousandth.
+    pub const RIGID_BODY: Self = Self {
+        kind: Some(FormulaKind::Exact),
+        error: 1e-4,
+        ..Self::LINEAR
+    };
+    /// A constant error of torque or of the pose: as little, where one of these leaves next to nothing.
+    pub const CONSTANT: Self = Self {
+        held: Held::NextToNothing,
+        ..Self::RIGID_BODY
+    };
+}
