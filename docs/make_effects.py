@@ -31,7 +31,10 @@ HEAD = """\
 What a machine may have and a simulator may lack. Every effect reduces to the base model when all
 its *amplitudes* are at their neutral value, whatever its *shape* parameters are; the neutral value
 of a shape parameter is the usual one. Bounds are what is accepted, `typical` is the natural scale
-of a search. Symbols, signs and sides are those of [conventions](conventions.md).
+of a search. Priors say how values are spread over machines: *half-normal*, off the neutral value with
+the typical size as standard deviation; *log-normal*, about the typical size with that standard
+deviation of the logarithm; *uniform*, anywhere between the bounds. Symbols, signs and sides are those
+of [conventions](conventions.md).
 """
 
 
@@ -118,13 +121,14 @@ def section(effect: Mapping[str, Any]) -> str:
         "",
         facts(effect),
         "",
-        "| parameter | unit | role | neutral | bounds | typical |",
-        "|---|---|---|---|---|---|",
+        "| parameter | unit | role | neutral | bounds | typical | prior |",
+        "|---|---|---|---|---|---|---|",
     ]
     for p in effect["parameters"]:
         bounds = f"{number(p['lower'])} to {number(p['upper'])}"
         numbers = f"{number(p['neutral'])} | {bounds} | {number(p['typical'])}"
-        lines.append(f"| `{p['name']}` | {cell(p['unit'])} | {p['role']} | {numbers} |")
+        prior = p["prior"].replace("_", "-") + (f" {number(p['spread'])}" if p["spread"] else "")
+        lines.append(f"| `{p['name']}` | {cell(p['unit'])} | {p['role']} | {numbers} | {prior} |")
     return "\n".join([*lines, ""])
 
 

@@ -89,6 +89,9 @@ class ParameterInfo(TypedDict):
     lower: float
     upper: float
     typical: float
+    prior: Literal["half_normal", "log_normal", "uniform"]
+    spread: float
+    sizes: str
     marks: list[
         Literal["optional", "place", "notation", "fastest_time", "shows_inverse", "held_first"]
     ]

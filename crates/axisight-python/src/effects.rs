@@ -1,8 +1,8 @@
 //! The effect table and effect settings.
 
 use axisight_core::effects::{
-    BegunFrom, EFFECTS, EffectInfo, Formula, Later, Linear, ParameterInfo, Plainer, Resembles,
-    SpringChange,
+    BegunFrom, EFFECTS, EffectInfo, Formula, Later, Linear, ParameterInfo, Plainer, Prior,
+    Resembles, SpringChange,
 };
 use axisight_core::robot::{EffectSetting, Place};
 use pyo3::prelude::*;
@@ -95,6 +95,13 @@ fn parameter<'py>(py: Python<'py>, p: &ParameterInfo) -> PyResult<Bound<'py, PyD
     row.set_item("lower", p.lower)?;
     row.set_item("upper", p.upper)?;
     row.set_item("typical", p.typical)?;
+    let (prior, spread) = match p.prior {
+        Prior::LogNormal { spread } => ("log_normal".to_owned(), spread),
+        other => (word(&other), 0.0),
+    };
+    row.set_item("prior", prior)?;
+    row.set_item("spread", spread)?;
+    row.set_item("sizes", p.sizes)?;
     row.set_item("marks", words(p.marks))?;
     Ok(row)
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from typing import Any, Literal
 
 from axisight import _core
 from axisight.effects.kin import BegunFrom, Formula, Later, Plainer, Resembles, SpringChange
+from axisight.effects.priors import half_normal, log_normal
 from axisight.errors import InputError
 
 Mark = Literal["optional", "place", "notation", "fastest_time", "shows_inverse", "held_first"]
@@ -27,7 +29,9 @@ class EffectParameter:
 
     ``role``: the effect vanishes when every ``"amplitude"`` is at its neutral
     value; a ``"shape"`` may then be anything. ``lower`` and ``upper`` bound the
-    value, ``typical`` is its natural scale; all in ``unit``. ``marks``: what else is to be known of it.
+    value, ``typical`` is its natural scale; all in ``unit``. ``prior``, with the standard deviation ``spread`` of
+    a logarithm [1]: how values are spread over machines (`log_prior`), ``sizes`` what that rests on.
+    ``marks``: what else is to be known of it.
     """
 
     name: str
@@ -37,7 +41,24 @@ class EffectParameter:
     lower: float
     upper: float
     typical: float
+    prior: Literal["half_normal", "log_normal", "uniform"]
+    spread: float
+    sizes: str
     marks: tuple[Mark, ...]
+
+    def log_prior(self, value: float) -> float:
+        """Return the logarithm of the density of a value over machines, of one a unit.
+
+        Minus infinity beyond the bounds, where there is no such effect, and of none where some is for sure.
+        """
+        bounds = self.lower, self.upper
+        if not self.lower <= value <= self.upper:
+            return -math.inf
+        if self.prior == "uniform":
+            return -math.log(self.upper - self.lower)
+        if self.prior == "log_normal":
+            return log_normal(value, self.typical, self.spread, bounds)
+        return half_normal(value, self.neutral, self.typical, bounds)
 
 
 @dataclass(frozen=True)

@@ -139,15 +139,16 @@ def test_gallery_draws_what_the_effect_does(repository: Path) -> None:
 def test_table_cells_cannot_break_the_effects_page(repository: Path) -> None:
     script = load_script(repository / "docs" / "make_effects.py")
     parameter = {"name": "p", "unit": "a|b", "role": "shape"} | dict.fromkeys(
-        ("neutral", "lower", "upper", "typical"), 0.0
+        ("neutral", "lower", "upper", "typical", "spread"), 0.0
     )
+    parameter["prior"] = "uniform"
     effect = {"name": "e", "summary": "s|t", "equation": "x", "source": "y"}
     effect |= {"scope": "arm", "acts": "arm", "parameters": [parameter]}
     effect |= {"family": "arm", "contains": [], "parts": [], "usual": [], "twins": []}
     effect |= {"stands_for": None, "linear": "no", "inverse_dynamics": False}
     effect |= {"twins_alone": False, "plainer": None, "resembles": None, "formula": {"error": 0.02}}
     rows = [line for line in script.render([effect]).splitlines() if line.startswith("| ")]
-    for row, columns in zip(rows, (3, 3, 6, 6), strict=True):
+    for row, columns in zip(rows, (3, 3, 7, 7), strict=True):
         assert len(re.findall(r"(?<!\\)\|", row)) == columns + 1, row
 
 

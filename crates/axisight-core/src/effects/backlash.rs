@@ -1,7 +1,7 @@
 //! Backlash: a dead zone between motor and joint.
 
 use super::formulas::{dead_zone, dead_zone_inverse};
-use super::{Absorber, Acts, Deflected, EffectInfo, Experiment, Family, Kernel, LawOf, Mark, ParameterInfo, Role};
+use super::{Absorber, Acts, Deflected, EffectInfo, Experiment, Family, Kernel, LawOf, Mark, ParameterInfo, Prior, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -33,6 +33,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 1.0,
             typical: 0.5,
             marks: &[Mark::HeldFirst],
+            prior: Prior::Uniform,
+            sizes: "judgement: teeth that damp in contact only, or grease that damps all the way",
             ..ParameterInfo::PLAIN
         },
     ],

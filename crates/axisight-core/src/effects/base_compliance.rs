@@ -2,7 +2,7 @@
 //!
 //! Twist about the first axis is the spring of its gear, with nothing that moves between the two.
 
-use super::{Acts, BaseJoint, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Role, Scope};
+use super::{Acts, BaseJoint, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Prior, Role, Scope};
 use crate::robot::Motion;
 use axisight_scalar::Scalar;
 
@@ -38,6 +38,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.0,
             upper: 0.1,
             typical: 2e-3,
+            prior: Prior::LogNormal { spread: 1.0 },
+            sizes: "judgement: damping of structures, a factor of seven either way (95 %)",
             ..ParameterInfo::PLAIN
         },
     ],

@@ -1,6 +1,6 @@
 //! A current loop of second order.
 
-use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, Resembles, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, Prior, Resembles, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -40,6 +40,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.1,
             upper: 0.95,
             typical: 0.7,
+            prior: Prior::LogNormal { spread: 0.3 },
+            sizes: "Leonhard (2001), Control of Electrical Drives, section 7.2: loops are tuned to a damping of 0.7",
             ..ParameterInfo::PLAIN
         },
     ],

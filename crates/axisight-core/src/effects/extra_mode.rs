@@ -1,6 +1,6 @@
 //! A mode that the simulator does not have: something on the joint swings on a spring.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Joint, Kernel, ParameterInfo, Role};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Joint, Kernel, ParameterInfo, Prior, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -31,6 +31,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.5,
             upper: 200.0,
             typical: 15.0,
+            prior: Prior::LogNormal { spread: 0.7 },
+            sizes: "judgement: tools, hoses and structures swing at 4 to 60 Hz",
             ..ParameterInfo::PLAIN
         },
         ParameterInfo {
@@ -41,6 +43,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 1e-3,
             upper: 1.0,
             typical: 0.05,
+            prior: Prior::LogNormal { spread: 1.0 },
+            sizes: "judgement: damping of structures, a factor of seven either way (95 %)",
             ..ParameterInfo::PLAIN
         },
     ],

@@ -1,6 +1,6 @@
 //! Viscous friction that changes while the gear warms up.
 
-use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Motor, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Motor, ParameterInfo, Prior, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -31,6 +31,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.1,
             upper: 1e5,
             typical: 0.5,
+            prior: Prior::LogNormal { spread: 2.5 },
+            sizes: "judgement: from the length of a short log to the hour that a gear takes",
             ..ParameterInfo::PLAIN
         },
         // F_0: a machine that is warm as modelled begins with more.

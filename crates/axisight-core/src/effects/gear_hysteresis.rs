@@ -1,6 +1,6 @@
 //! Gear hysteresis: a spring beside the gear's own slips, and remembers.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, LawOf, ParameterInfo, Role, Spring, SpringChange};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, LawOf, ParameterInfo, Prior, Role, Spring, SpringChange};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -32,6 +32,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 1e-6,
             upper: 1.0,
             typical: 3e-4,
+            prior: Prior::LogNormal { spread: 1.2 },
+            sizes: "judgement: gears lose their friction over 0.1 to 10 minutes of arc",
             ..ParameterInfo::PLAIN
         },
         // Of a stiffness measured with small motions all, of one measured with large ones nothing.
@@ -42,6 +44,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: -0.5,
             upper: 1.5,
             typical: 0.5,
+            prior: Prior::Uniform,
+            sizes: "judgement: a stiffness was measured with small motions, or with large ones",
             ..ParameterInfo::PLAIN
         },
         // How suddenly each element slips, and how far apart they do: the more, the less small loops creep
@@ -53,6 +57,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.0,
             upper: 1.0,
             typical: 0.5,
+            prior: Prior::Uniform,
+            sizes: "judgement: Dahl and springs with sliders are both met",
             ..ParameterInfo::PLAIN
         },
         // What it remembers of the motion before a run.
@@ -63,6 +69,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: -1.0,
             upper: 1.0,
             typical: 0.5,
+            prior: Prior::Uniform,
+            sizes: "judgement: any motion may have been before a run",
             ..ParameterInfo::PLAIN
         },
     ],

@@ -34,7 +34,7 @@ impl<S: Scalar> Harmonics<S> {
 macro_rules! harmonic_parameters {
     ($($unit:literal $limit:literal $typical:literal $order:literal $cosine:literal $sine:literal $neutral:literal),* $(,)?) => {
         &[$(
-            ParameterInfo { name: $order, unit: "1", role: Role::Shape, neutral: $neutral, lower: 0.0, upper: 500.0, typical: 1.0, ..ParameterInfo::PLAIN },
+            ParameterInfo { name: $order, unit: "1", role: Role::Shape, neutral: $neutral, lower: 0.0, upper: 500.0, typical: 1.0, prior: Prior::Uniform, sizes: "judgement: data show it by themselves", ..ParameterInfo::PLAIN },
             ParameterInfo { name: $cosine, unit: $unit, role: Role::Amplitude, neutral: 0.0, lower: -$limit, upper: $limit, typical: $typical, ..ParameterInfo::PLAIN },
             ParameterInfo { name: $sine, unit: $unit, role: Role::Amplitude, neutral: 0.0, lower: -$limit, upper: $limit, typical: $typical, ..ParameterInfo::PLAIN },
         )*]

@@ -1,6 +1,6 @@
 //! Gear that gives way around its middle: play that carries part of the torque.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, LawOf, ParameterInfo, Role, Spring, SpringChange};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, LawOf, ParameterInfo, Prior, Role, Spring, SpringChange};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -33,6 +33,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 1e-6,
             upper: 0.05,
             typical: 3e-4,
+            prior: Prior::LogNormal { spread: 1.2 },
+            sizes: "judgement: gears are soft over 0.1 to 10 minutes of arc",
             ..ParameterInfo::PLAIN
         },
         // Teeth come into contact one after another, or all at once.
@@ -44,6 +46,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.02,
             upper: 3.0,
             typical: 0.3,
+            prior: Prior::LogNormal { spread: 1.0 },
+            sizes: "judgement: teeth come into contact one after another, or all at once",
             ..ParameterInfo::PLAIN
         },
     ],

@@ -12,7 +12,7 @@ pub use axisight_plant::effect::{
     Absorber, Acts, Arm, AxisTorque, BaseJoint, BegunFrom, Change, CoupledAxis, Deflected,
     EffectError, EffectInfo, Experiment, Family, Formula, FormulaKind, GearError, Held, Joint,
     Kernel, Later, LawOf, Linear, Mark, Motor, Pair, ParameterInfo, Plainer, PlantParameters,
-    Resembles, Role, Scales, Scope, Shown, Spring, SpringChange, StandsFor,
+    Prior, Resembles, Role, Scales, Scope, Shown, Spring, SpringChange, StandsFor,
 };
 pub use axisight_plant::formulas;
 
@@ -28,6 +28,8 @@ const SMOOTHING: ParameterInfo = ParameterInfo {
     upper: 50.0,
     typical: 0.1,
     marks: &[Mark::Notation],
+    prior: Prior::LogNormal { spread: 1.5 },
+    sizes: "judgement: how sharply a sign turns, over machines and those who write it, a factor of twenty either way (95 %)",
     ..ParameterInfo::PLAIN
 };
 
@@ -40,6 +42,8 @@ const STRIBECK_SPEED: ParameterInfo = ParameterInfo {
     lower: 1e-4,
     upper: 500.0,
     typical: 3.0,
+    prior: Prior::LogNormal { spread: 2.3 },
+    sizes: "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), table 1: 1e-5 to 0.1 m/s at the contact",
     ..ParameterInfo::PLAIN
 };
 

@@ -1,7 +1,7 @@
 //! Gear stiffness that takes one value at small loads and another at large ones.
 
 use super::formulas::dead_zone;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, LawOf, ParameterInfo, Plainer, Role, Shown, Spring, SpringChange};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, LawOf, ParameterInfo, Plainer, Prior, Role, Shown, Spring, SpringChange};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -50,6 +50,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 1e-6,
             upper: 0.1,
             typical: 3e-4,
+            prior: Prior::LogNormal { spread: 1.2 },
+            sizes: "judgement: gears stiffen over 0.1 to 10 minutes of arc",
             ..ParameterInfo::PLAIN
         },
     ],

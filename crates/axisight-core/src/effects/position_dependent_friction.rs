@@ -1,7 +1,7 @@
 //! Dry friction that changes with the position of the axis.
 
 use super::sides::{ARM_SHARE, Friction, on_sides};
-use super::{Absorber, Acts, BegunFrom, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, Mark, ParameterInfo, Role, SMOOTHING};
+use super::{Absorber, Acts, BegunFrom, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, Mark, ParameterInfo, Prior, Role, SMOOTHING};
 use axisight_scalar::Scalar;
 
 const fn wave(name: &'static str) -> ParameterInfo {
@@ -44,6 +44,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 1e-4,
             upper: 100.0,
             typical: 0.01,
+            prior: Prior::LogNormal { spread: 1.2 },
+            sizes: "judgement: a turn of the joint behind gears of 10 to 1000",
             ..ParameterInfo::PLAIN
         },
         SMOOTHING,

@@ -1,6 +1,6 @@
 //! Supply whose voltage gives way under power, and the drive's torque with it.
 
-use super::{Acts, EffectInfo, Experiment, Family, Kernel, Motor, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Kernel, Motor, ParameterInfo, Prior, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -30,6 +30,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.0,
             upper: 1.0,
             typical: 0.5,
+            prior: Prior::Uniform,
+            sizes: "judgement: a supply with a droop, or one at its limit",
             ..ParameterInfo::PLAIN
         },
     ],

@@ -1,7 +1,7 @@
 //! Presliding friction: bristles that bend before the surfaces slip.
 
 use super::formulas::stribeck_level;
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Later, LawOf, Mark, Motor, ParameterInfo, Plainer, Role, STRIBECK_SPEED, Shown};
+use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Later, LawOf, Mark, Motor, ParameterInfo, Plainer, Prior, Role, STRIBECK_SPEED, Shown};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -48,6 +48,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.1,
             upper: 10.0,
             typical: 1.5,
+            prior: Prior::LogNormal { spread: 0.4 },
+            sizes: "judgement: contacts break away at one to three times what they slip with",
             ..ParameterInfo::PLAIN
         },
         STRIBECK_SPEED,
@@ -59,6 +61,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 1e-9,
             upper: 10.0,
             typical: 1e-3,
+            prior: Prior::LogNormal { spread: 1.5 },
+            sizes: "Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), table 1: 1 to 50 um at the contact, on radii a factor of ten apart",
             ..ParameterInfo::PLAIN
         },
         ParameterInfo {
@@ -69,6 +73,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.0,
             upper: 1.0,
             typical: 1e-4,
+            prior: Prior::LogNormal { spread: 2.3 },
+            sizes: "judgement: from a tenth to some hundred times the typical time",
             ..ParameterInfo::PLAIN
         },
         // T_r: none in the paper. With one, no bristle slips faster, and a fixed step that is not
@@ -81,6 +87,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             upper: 1.0,
             typical: 1e-4,
             marks: &[Mark::FastestTime],
+            prior: Prior::Uniform,
+            sizes: "judgement: how somebody writes the law, not what a machine has",
             ..ParameterInfo::PLAIN
         },
     ],

@@ -1,7 +1,7 @@
 //! Resolver error over the motor angle.
 
 use super::harmonics::{Harmonics, harmonic_parameters};
-use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, Prior, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {

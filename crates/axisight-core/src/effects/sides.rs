@@ -1,6 +1,6 @@
 //! Dry friction on both sides of an elastic gear.
 
-use super::{Joint, Kernel, Mark, Motor, ParameterInfo, Role};
+use super::{Joint, Kernel, Mark, Motor, ParameterInfo, Prior, Role};
 use axisight_scalar::Scalar;
 
 /// Share of a friction that the arm feels, behind the gear.
@@ -12,6 +12,8 @@ pub(super) const ARM_SHARE: ParameterInfo = ParameterInfo {
     upper: 1.0,
     typical: 0.5,
     marks: &[Mark::Place],
+    prior: Prior::Uniform,
+    sizes: "judgement: on which side of a gear its seals and bearings rub is known of none",
     ..ParameterInfo::PLAIN
 };
 

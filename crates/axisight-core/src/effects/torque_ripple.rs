@@ -1,7 +1,7 @@
 //! Motor torque ripple over the motor angle.
 
 use super::harmonics::{Harmonics, harmonic_parameters};
-use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, Motor, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, Motor, ParameterInfo, Prior, Role};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {

@@ -1,6 +1,6 @@
 //! Torque limit of the drive.
 
-use super::{Acts, EffectInfo, Family, Formula, Kernel, Linear, ParameterInfo};
+use super::{Acts, EffectInfo, Family, Formula, Kernel, Linear, ParameterInfo, Prior};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -19,6 +19,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         lower: 1e-3,
         upper: 1e6,
         typical: 10.0,
+        prior: Prior::LogNormal { spread: 1.2 },
+        sizes: "judgement: limits of drives lie an order of magnitude either way of the torque that a motion needs",
         ..ParameterInfo::PLAIN
     }],
     ..EffectInfo::PLAIN

@@ -1,7 +1,7 @@
 //! Kinematic error of the gear over the motor angle.
 
 use super::formulas::harmonic_slope;
-use super::{Acts, EffectInfo, Experiment, Family, GearError, Kernel, ParameterInfo, Role};
+use super::{Acts, EffectInfo, Experiment, Family, GearError, Kernel, ParameterInfo, Prior, Role};
 use axisight_scalar::Scalar;
 
 const fn wave(name: &'static str) -> ParameterInfo {
@@ -33,6 +33,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.0,
             upper: 500.0,
             typical: 1.0,
+            prior: Prior::Uniform,
+            sizes: "judgement: data show it by themselves",
             ..ParameterInfo::PLAIN
         },
         wave("cosine_rad"),
@@ -60,6 +62,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             lower: 0.0,
             upper: 500.0,
             typical: 1.0,
+            prior: Prior::Uniform,
+            sizes: "judgement: data show it by themselves",
             ..ParameterInfo::PLAIN
         },
     ],

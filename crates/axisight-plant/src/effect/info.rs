@@ -5,6 +5,7 @@
 
 use super::formula::Formula;
 use super::kin::{BegunFrom, Later, LawOf, Plainer, Resembles, Scales, SpringChange};
+use super::prior::Prior;
 
 /// What an effect belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -192,12 +193,16 @@ pub struct ParameterInfo {
     /// Typical magnitude: natural scale of a search and width of a plausible range. It must visibly
     /// change the closed loop of the preset robot.
     pub typical: f64,
+    /// How its values are spread over machines.
+    pub prior: Prior,
+    /// What typical size and spread rest on.
+    pub sizes: &'static str,
     /// What else is to be known of it.
     pub marks: &'static [Mark],
 }
 
 impl ParameterInfo {
-    /// What most parameters are: an amplitude without marks. Name, unit, bounds and typical size are its own.
+    /// What most parameters are: an amplitude that may be none, without marks. Name, unit, bounds and typical size are its own.
     pub const PLAIN: Self = Self {
         name: "",
         unit: "1",
@@ -206,6 +211,8 @@ impl ParameterInfo {
         lower: 0.0,
         upper: 0.0,
         typical: 0.0,
+        prior: Prior::HalfNormal,
+        sizes: "judgement: the scale at which it shows on an arm like the preset",
         marks: &[],
     };
 }

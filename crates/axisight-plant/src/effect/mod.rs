@@ -5,6 +5,7 @@ mod formula;
 mod info;
 mod kernel;
 mod kin;
+mod prior;
 
 pub use error::EffectError;
 pub use formula::{Formula, FormulaKind, Held};
@@ -17,3 +18,4 @@ pub use kernel::{
     PlantParameters, Spring,
 };
 pub use kin::{BegunFrom, Later, LawOf, Plainer, Resembles, Scales, Shown, SpringChange};
+pub use prior::Prior;
