@@ -23,7 +23,6 @@ TO_DO: set[str] = {
     "measure/detection_limits.py",
     "prepare/stiff_bristles.py",
     "ranking/drive_lags.py",
-    "ranking/formula_error.py",
     "ranking/indistinguishable.py",
     "ranking/intervals.py",
     "ranking/plainer_law.py",
