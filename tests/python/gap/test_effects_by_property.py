@@ -24,7 +24,6 @@ TO_DO: set[str] = {
     "prepare/stiff_bristles.py",
     "ranking/drive_lags.py",
     "ranking/indistinguishable.py",
-    "ranking/intervals.py",
     "ranking/plainer_law.py",
     "ranking/posterior.py",
     "screening/restart_gear_law.py",

@@ -37,6 +37,9 @@ pub struct Formula {
     /// Whether what is left of the right one is white: a difference counts for more then.
     pub white: bool,
     /// Standard deviation of a parameter between formulas, as a share of its size [1].
+    ///
+    /// From draws of the benchmark on foreign engines that were looked at (seeds 3, 5, 110, 120 and 182 to 184: of
+    /// 1,050 values of the last three 97 % are held).
     pub value_error: f64,
     /// Whether it is that for each number that is fitted: each makes up for what another formula says of the rest.
     pub of_each: bool,

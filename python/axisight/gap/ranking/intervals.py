@@ -11,14 +11,6 @@ from axisight.effects import Effect, effect_info
 from axisight.gap.facts.named_cause import NamedCause
 from axisight.gap.facts.result import Interval
 
-# Standard deviations between formulas of one physical effect, as shares of a parameter's size: what
-# a linear model holds is the same in all books, and only integrators differ; of a law with several
-# numbers each makes up for what another formula says of the rest; so does a lag in the path of the torque, by how
-# a controller holds its command. From draws of the benchmark on foreign engines that were looked at
-# (seeds 3, 5, 110, 120 and 182 to 184: of 1,050 values of the last three 97 % are held).
-_EXACT = 0.004
-_LAW = 0.01
-
 
 def intervals(effect: Effect, free: Sequence[str], std: dict[str, float]) -> dict[str, Interval]:
     """Return the 95 % intervals of the fitted parameters ``free``, ``std`` those of the fit.
@@ -28,8 +20,7 @@ def intervals(effect: Effect, free: Sequence[str], std: dict[str, float]) -> dic
     info = effect_info(effect.name)
     values = effect.parameters or {}
     neutral = {p.name: p.neutral for p in info.parameters if p.role == "amplitude"}
-    of_law = info.linear == "no" or info.family == "timing"
-    share = _LAW * len(free) if of_law else _EXACT
+    share = info.formula.spread(len(free))
     bounds = {p.name: (p.lower, p.upper) for p in info.parameters}
     out = {}
     for name in free:
