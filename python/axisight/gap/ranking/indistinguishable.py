@@ -25,7 +25,7 @@ def twins_of(effect: str, n_axes: int) -> tuple[str, ...]:
     What is late on one axis of several is none: the others feel its motion when it is.
     """
     info = effect_info(effect)
-    return () if info.family == "timing" and n_axes > 1 else info.twins
+    return () if info.twins_alone and n_axes > 1 else info.twins
 
 
 def with_twins(ranking: Sequence[Candidate], n_axes: int) -> tuple[Candidate, ...]:
