@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
 from axisight.effects.stated import (
-    BEHIND_GEAR,
     CURRENT_LOOP,
     ONE_FORMULA,
     PLAY,
@@ -57,7 +56,8 @@ def numbers(effect: Hypothesis) -> float:
     On which side of a gear it acts is a place, which counts no more than the axis does.
     """
     harmonics = sum(name.startswith("cosine_") and name[7].isdigit() for name in effect.free)
-    return float(len(effect.free) + harmonics - (BEHIND_GEAR in effect.free))
+    places = effect_info(effect.effect.name).marked("place")
+    return float(len(effect.free) + harmonics - len({*places} & {*effect.free}))
 
 
 @dataclass(frozen=True)
