@@ -19,7 +19,6 @@ ELSE = {
 }
 # Still to do.
 TO_DO: set[str] = {
-    "fit/idle_numbers.py",
     "measure/detection_limits.py",
     "prepare/stiff_bristles.py",
     "ranking/drive_lags.py",

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
-from axisight.effects.stated import GAIN_OF_POSITION, OTHER_GAINS
 from axisight.gap.fit.fitted_model import FittedModel
 
 Array = NDArray[np.float64]
@@ -24,8 +23,6 @@ Term = tuple[tuple[str, ...], float]
 
 # Fitted values of a term of a series: cosine, sine and order.
 _OF_A_WAVE = 3.0
-_COORDINATES = ("x_m", "y_m", "z_m", "cosine_nm", "at_zero_nm", "about_x_rad", "about_y_rad")
-_GAINS = (*OTHER_GAINS[1], GAIN_OF_POSITION[1])
 
 
 def idle_numbers(fitted: FittedModel, pays: Callable[[float, float, float], bool]) -> float:
@@ -69,15 +66,15 @@ def idle_numbers(fitted: FittedModel, pays: Callable[[float, float, float], bool
 
 
 def _terms(fitted: FittedModel, free: set[str]) -> list[Term]:
-    """Return what may be idle of the last effect: waves of a series, coordinates, gains."""
+    """Return what may be idle of the last effect: waves of a series, and what is marked so."""
     effect = fitted.effects[-1]
-    values = effect.parameters or {}
+    info, values = effect_info(effect.name), effect.parameters or {}
     waves: list[Term] = [
         ((cosine, sine), _OF_A_WAVE)
-        for order, cosine, sine in effect_info(effect.name).terms().values()
+        for order, cosine, sine in info.terms().values()
         if values.get(order) and cosine in free and sine in free
     ]
-    single: list[Term] = [((name,), 1.0) for name in (*_COORDINATES, *_GAINS) if name in free]
+    single: list[Term] = [((name,), 1.0) for name in info.marked("optional") if name in free]
     return [*waves, *single]
 
 
