@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from axisight.effects import Effect, effect_info
 from axisight.effects.stated import (
     CURRENT_LOOP,
-    ONE_FORMULA,
     PLAY,
     SPRING_CHANGES,
     TRANSPORT_DELAY,
@@ -500,6 +499,6 @@ def of_one_formula(standing: AxisPosterior) -> list[RankedHypothesis]:
     return [
         r
         for r in standing.ranked[1:]
-        if {r.trial.hypothesis.effect.name, first.trial.hypothesis.effect.name} <= ONE_FORMULA
+        if all(effect_info(x.trial.hypothesis.effect.name).formula.exact for x in (r, first))
         and r.score > least
     ]
