@@ -228,7 +228,7 @@ class AxisPosterior:
         usual = [effect_info(name) for name in effect_info(effect.name).usual]
         axes = [effect.axis] if effect.axes is None else list(effect.axes)
         odds = {
-            Effect(i.name, None if i.scope == "arm" else axis).label: _ODDS[i.scope]
+            Effect(i.name, None if i.scope == "arm" else axis).label: i.usual_odds
             for i in usual
             for axis in axes
         }
@@ -256,9 +256,6 @@ class AxisPosterior:
 # A middle that has lost this share of its stiffness is none; and what play explains of what it does.
 _NO_MIDDLE = 0.95
 _AS_PLAY = 0.8
-# How many times as often the usual one of two is met: the simpler law of an axis; a load, which every
-# arm is there to carry, beside a link that is not as it was drawn: named first, with the link beside it.
-_ODDS = {"axis": 4.0, "axes": 4.0, "arm": 3.0}
 # A rival this likely beside the winner leaves the cause open, and so do all of them if together they are
 # as likely as this.
 _RIVAL = 0.2
