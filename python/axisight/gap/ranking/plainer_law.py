@@ -15,16 +15,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import Effect
-from axisight.effects.stated import (
-    BRISTLES,
-    CONSTANT,
-    DRY_FRICTION,
-    JOINT_SPRING,
-    KNEE,
-    STIFFER,
-    STRIBECK,
-)
+from axisight.effects import Effect, effect_info
+from axisight.effects.friction_curves import rise_over_high_speed
+from axisight.effects.kin import Plainer
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.held_out import step_without
 
@@ -37,18 +30,6 @@ _UNKNOWN = 0.5
 # By how much of itself friction is larger at some speed than at high speed, where it has an excess: five per
 # cent is what another rounding of the corner makes of it.
 _RISES = 0.05
-# Speeds at which that is looked for, of the one over which an excess falls.
-_LOOKED_AT = np.geomspace(1e-3, 10.0, 200)
-# What each law is without what it adds, and by how many times that is likelier then: friction has corners and ways
-# too small to show, a cable that pulls like a constant is none.
-_PLAINER = {
-    BRISTLES[0]: (DRY_FRICTION[0], 10.0),
-    STRIBECK[0]: (DRY_FRICTION[0], 10.0),
-    JOINT_SPRING[0]: (CONSTANT[0], 50.0),
-    KNEE[0]: (STIFFER[0], 10.0),
-}
-# What each of them adds; of all but Stribeck's an error tells whether it is there.
-_ADDED = {BRISTLES[0]: BRISTLES[1:2], JOINT_SPRING[0]: JOINT_SPRING[1:2], KNEE[0]: KNEE[1:]}
 
 
 def held_to_plainer(
@@ -64,28 +45,18 @@ def held_to_plainer(
     out = logp.copy()
     places = {(effect.name, effect.axis): i for i, effect in enumerate(effects)}
     for (name, axis), i in places.items():
-        plainer, likelier = _PLAINER.get(name, ("", 1.0))
-        plain = places.get((plainer, axis))
-        if plain is not None and _is_plain(name, fits[i], stretch):
-            out[i] = min(out[i], out[plain] - np.log(likelier))
+        plainer = effect_info(name).plainer
+        plain = None if plainer is None else places.get((plainer.law, axis))
+        if plainer is not None and plain is not None and _is_plain(plainer, fits[i], stretch):
+            out[i] = min(out[i], out[plain] - np.log(plainer.likelier))
     return out
 
 
-def _is_plain(name: str, fit: FittedModel, stretch: NDArray[np.int64]) -> bool:
+def _is_plain(plainer: Plainer, fit: FittedModel, stretch: NDArray[np.int64]) -> bool:
     """Whether a fitted law is no more than its plainer one."""
-    if name == STRIBECK[0]:
-        return excess_shown(fit.effects[-1]) < _RISES
-    return any(own_error(fit, added, stretch) > _UNKNOWN for added in _ADDED[name])
-
-
-def excess_shown(effect: Effect) -> float:
-    """Return by how much Stribeck friction is at most larger than at high speed, of that [1]."""
-    dry, excess, speed, corner = ((effect.parameters or {})[name] for name in STRIBECK[1:])
-    if dry <= 0:
-        return float("inf") if excess > 0 else 0.0
-    v = _LOOKED_AT * speed
-    friction = (dry + excess * np.exp(-((v / speed) ** 2))) * np.tanh(v / corner)
-    return float(friction.max() / dry - 1.0)
+    if plainer.by_rise:
+        return rise_over_high_speed(fit.effects[-1]) < _RISES
+    return any(own_error(fit, added, stretch) > _UNKNOWN for added in plainer.adds)
 
 
 def own_error(fitted: FittedModel, name: str, stretch: NDArray[np.int64]) -> float:

@@ -9,6 +9,7 @@ import pytest
 
 from axisight import _core
 from axisight.effects import Effect, EffectInfo, effect_table
+from axisight.effects.friction_curves import CURVES
 from axisight.gap.facts.settings import DEFAULT_TOLERANCES
 from axisight.gap.hypotheses.start_values import STARTS
 from axisight.gap.ranking.posterior import FORMULA_ERROR
@@ -20,8 +21,9 @@ KNOWING = (
     "crates/axisight-core/src/effects/",
     "python/axisight/gap/hypotheses/start_values.py",
     "python/axisight/effects/stated.py",
-    # Closed forms of the laws of gears, which tests hold against simulations.
+    # Closed forms of the laws of gears and of friction, which tests hold against simulations.
     "python/axisight/effects/gear_curves.py",
+    "python/axisight/effects/friction_curves.py",
     # What a benchmark withholds has the names that verdicts give it.
     "python/axisight/blind/withheld.py",
     "python/axisight/blind/withheld_formulas.py",
@@ -46,6 +48,7 @@ def test_what_an_effect_is_akin_to_is_in_the_table(info: EffectInfo) -> None:
         law = TABLE[info.plainer.law]
         assert set(info.plainer.adds) <= own and info.plainer.likelier > 1
         assert law.scope == info.scope
+        assert not info.plainer.by_rise or info.name in CURVES
     if info.resembles is not None:
         # Of one number, which is in proportion to one of its own.
         (p,) = TABLE[info.resembles.law].parameters

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from axisight import Effect
+from axisight.effects.friction_curves import rise_over_high_speed
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.hypotheses.candidates import on_the_motor, one_sided
-from axisight.gap.ranking.plainer_law import excess_shown, held_to_plainer
+from axisight.gap.ranking.plainer_law import held_to_plainer
 from axisight.gap.search.swap import alike
 from axisight.robot import load_robot
 
@@ -30,11 +31,11 @@ def held(law: Effect, logp: list[float]) -> np.ndarray:
 
 def test_an_excess_shows_as_the_sign_turns():
     # At three corners the sign lacks 5e-3, and the hump a thousandth: of three times the level no more than 0.02.
-    assert 1.98 < excess_shown(stribeck(0.02)) < 2.0
-    assert excess_shown(stribeck(0.02, excess_nm=0.0)) == pytest.approx(0.0, abs=1e-12)
+    assert 1.98 < rise_over_high_speed(stribeck(0.02)) < 2.0
+    assert rise_over_high_speed(stribeck(0.02, excess_nm=0.0)) == pytest.approx(0.0, abs=1e-12)
     # The excess is gone where a wide sign has turned: friction only rises with speed.
-    assert excess_shown(stribeck(4.0, excess_nm=0.5)) < 1e-6
-    assert excess_shown(stribeck(0.02, coulomb_nm=0.0)) == float("inf")
+    assert rise_over_high_speed(stribeck(4.0, excess_nm=0.5)) < 1e-6
+    assert rise_over_high_speed(stribeck(0.02, coulomb_nm=0.0)) == float("inf")
 
 
 @pytest.mark.parametrize(("corner", "likelier"), [(0.02, True), (4.0, False)])
