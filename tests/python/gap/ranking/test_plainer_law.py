@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from axisight import Effect
-from axisight.effects.friction_curves import rise_over_high_speed
+from axisight.effects.friction_curves import CURVES, rise_over_high_speed
+from axisight.gap.facts.simulator_variant import AS_GIVEN
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.hypotheses.candidates import on_the_motor, one_sided
 from axisight.gap.ranking.plainer_law import held_to_plainer
 from axisight.gap.search.swap import alike
+from axisight.gap.simulator.rigid_torque import predicted_torque
 from axisight.robot import load_robot
+from gap_data import bare_axis
 
 # A level of 0.5 Nm, and one Nm more at standstill that falls over 2 rad/s.
 FALLS = {"coulomb_nm": 0.5, "excess_nm": 1.0, "stribeck_speed_rad_s": 2.0}
@@ -36,6 +39,19 @@ def test_an_excess_shows_as_the_sign_turns():
     # The excess is gone where a wide sign has turned: friction only rises with speed.
     assert rise_over_high_speed(stribeck(4.0, excess_nm=0.5)) < 1e-6
     assert rise_over_high_speed(stribeck(0.02, coulomb_nm=0.0)) == float("inf")
+
+
+def test_the_curve_is_the_law_of_the_core():
+    """Oracle: what the motor of an axis without a gear needs more at constant speeds."""
+    speed = np.linspace(-5.0, 5.0, 41)[:, None]
+    still = np.zeros_like(speed)
+    law = stribeck(0.3)
+    bare, held_back = (
+        predicted_torque(bare_axis().with_effects(effects), AS_GIVEN, (still, speed, still, still))
+        for effects in ([], [law])
+    )
+    curve = CURVES[law.name](speed, law.parameters)
+    np.testing.assert_allclose(held_back - bare, curve, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(("corner", "likelier"), [(0.02, True), (4.0, False)])
