@@ -128,6 +128,16 @@ class EffectInfo:
         """Effects that become this one at some value of their parameters."""
         return tuple(e.name for e in effect_table().values() if self.name in e.contains)
 
+    @property
+    def late(self) -> bool:
+        """Whether it is that something comes late: torque, a reading, references."""
+        return self.family == "timing"
+
+    @property
+    def drive_lag(self) -> bool:
+        """Whether it is a delay or lag of the drive, between commanded and applied torque."""
+        return self.late and self.acts == "torque_path"
+
     def marked(self, mark: Mark) -> tuple[str, ...]:
         """Return the names of the parameters with a mark."""
         return tuple(p.name for p in self.parameters if mark in p.marks)

@@ -41,8 +41,7 @@ def _is_of(axis: int, one: FittedHypothesis) -> bool:
 
 def is_lag(effect: Effect) -> bool:
     """Whether an effect is a delay or a lag of a drive."""
-    info = effect_info(effect.name)
-    return info.family == "timing" and info.acts == "torque_path"
+    return effect_info(effect.name).drive_lag
 
 
 def ended(

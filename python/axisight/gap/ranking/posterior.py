@@ -428,8 +428,8 @@ def _with_those_that_fit_better(
 def are_lags(one: FittedHypothesis, other: FittedHypothesis) -> bool:
     """Whether both are delays or lags of one axis."""
     effects = one.hypothesis.effect, other.hypothesis.effect
-    families = {effect_info(e.name).family for e in effects}
-    return families == {"timing"} and effects[0].axis == effects[1].axis
+    late = all(effect_info(e.name).late for e in effects)
+    return late and effects[0].axis == effects[1].axis
 
 
 def _significance(
