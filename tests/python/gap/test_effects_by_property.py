@@ -21,7 +21,6 @@ ELSE = {
 TO_DO: set[str] = {
     "measure/detection_limits.py",
     "prepare/stiff_bristles.py",
-    "ranking/drive_lags.py",
     "ranking/posterior.py",
     "screening/restart_gear_law.py",
     "screening/restart_stiction.py",

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from axisight.effects import Effect, effect_info
-from axisight.effects.stated import CURRENT_LOOP, TRANSPORT_DELAY
+from axisight.effects import Effect, effect_info, effect_table
+from axisight.effects.kin import Resembles
 from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.model_fitter import ModelFitter
@@ -22,8 +20,6 @@ _NEAR = 0.03
 # Steps of a fit that is to end, and the loss that one more has to bring.
 _STEPS = 12
 _WORTH = 1.0
-# Damping at which a current loop is most like a delay.
-_AS_DELAY = float(np.sqrt(0.5))
 
 
 def lags_beside(standing: AxisPosterior) -> list[FittedHypothesis]:
@@ -47,16 +43,20 @@ def is_lag(effect: Effect) -> bool:
 def ended(
     fitter: ModelFitter, lags: Sequence[FittedHypothesis], options: Sequence[Hypothesis]
 ) -> list[FittedModel]:
-    """Return fits of lags that have ended; of a current loop the better of two, one begun as the delay among them."""
+    """Return fits of lags that have ended; of one that is like another the better of two, one begun as that."""
     found = {one.hypothesis.effect.name: _ended(fitter, one.fitted) for one in lags}
-    delay = found.get(TRANSPORT_DELAY[0])
-    loop = found.get(CURRENT_LOOP[0])
-    begun = None if delay is None else _as_delay(delay, options)
-    if delay is not None and begun is not None and (loop is None or loop.total > delay.total):
-        again = fitter.fit(begun, delay, fresh=True, max_iterations=_STEPS, worth=_WORTH)
-        # Where no loop holds, what there is stays.
-        if not isinstance(again, Diverged) and (loop is None or again.total < loop.total):
-            found[CURRENT_LOOP[0]] = again
+    for info in effect_table().values():
+        other = None if info.resembles is None else found.get(info.resembles.law)
+        mine = found.get(info.name)
+        if info.resembles is None or other is None:
+            continue
+        begun = _begun_as(other, info.name, info.resembles, options)
+        if begun is None or (mine is not None and mine.total <= other.total):
+            continue
+        again = fitter.fit(begun, other, fresh=True, max_iterations=_STEPS, worth=_WORTH)
+        # Where it does not hold, what there is stays.
+        if not isinstance(again, Diverged) and (mine is None or again.total < mine.total):
+            found[info.name] = again
     return list(found.values())
 
 
@@ -65,11 +65,11 @@ def _ended(fitter: ModelFitter, fitted: FittedModel) -> FittedModel:
     return fitted if isinstance(found, Diverged) else found
 
 
-def _as_delay(delay: FittedModel, options: Sequence[Hypothesis]) -> list[Hypothesis] | None:
-    """Return a model with a current loop in the place of the delay that it ends with; None where none is tried."""
-    name, time_constant, damping = CURRENT_LOOP
-    effect = delay.effects[-1]
-    late_s = effect.values()[0]
-    shape = {time_constant: late_s / (2 * _AS_DELAY), damping: _AS_DELAY}
-    loops = (o for o in options if (o.effect.name, o.effect.axis) == (name, effect.axis))
-    return next(([*delay.free[:-1], loop.at(shape)] for loop in loops), None)
+def _begun_as(
+    other: FittedModel, name: str, like: Resembles, options: Sequence[Hypothesis]
+) -> list[Hypothesis] | None:
+    """Return a model with an effect in the place of the one that it is like, the last; None where none is tried."""
+    effect = other.effects[-1]
+    values = like.values(effect.values()[0])
+    tried = (o for o in options if (o.effect.name, o.effect.axis) == (name, effect.axis))
+    return next(([*other.free[:-1], one.at(values)] for one in tried), None)

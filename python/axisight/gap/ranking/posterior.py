@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
 from axisight.effects.stated import (
-    CURRENT_LOOP,
     PLAY,
     SPRING_CHANGES,
-    TRANSPORT_DELAY,
 )
 from axisight.gap.facts.trace import NONE, UNKNOWN, Adjustment, log_odds
 from axisight.gap.fit.amplitude_significance import amplitude_significance
@@ -365,23 +363,18 @@ def stand(
     return AxisPosterior(axis, tuple(ranked), none, unknown, tuple(belief.ledger))
 
 
-# Of machines that a delay describes as well as a current loop, which are delays for one that is a loop: loops are as
-# frequent, and half of them are not damped like a delay.
-_RARER = float(np.log(2.0))
-
-
 def _costs(trials: Sequence[FittedHypothesis]) -> Array:
     """Return what the numbers of each trial cost (n_trials,).
 
-    A well damped current loop is a delay up to the third power of frequency: where neither leaves more, its
-    second number makes it no rarer than that.
+    What is like another effect at some values of its parameters is no rarer, where neither leaves more, than its
+    resemblance has it: its further numbers cost no more than that.
     """
     out = _PARAMETER_COST * np.array([t.cost for t in trials])
-    loop, like = CURRENT_LOOP[0], TRANSPORT_DELAY[0]
     places = {(t.hypothesis.effect.name, t.hypothesis.effect.axis): i for i, t in enumerate(trials)}
     for (name, axis), i in places.items():
-        if name == loop and (like, axis) in places:
-            out[i] = min(out[i], out[places[like, axis]] + _RARER)
+        like = effect_info(name).resembles
+        if like is not None and (like.law, axis) in places:
+            out[i] = min(out[i], out[places[like.law, axis]] + float(np.log(like.rarer)))
     return out
 
 
