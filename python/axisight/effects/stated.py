@@ -200,13 +200,6 @@ TORQUE_CONSTANT = ("torque_constant", "relative_error")
 TORQUE_SENSOR = ("torque_sensor_gain", "relative_error")
 """What a torque that is reported too large or too small is, and its parameter."""
 
-SPRING_CHANGES = {
-    "piecewise_stiffness": (("within",), ("within", "step")),
-    "lost_motion": (("softness",),),
-    "gear_hysteresis": (("share",),),
-}
-"""Laws that make a gear another spring, and the parameters whose sums are the changes of its stiffness [1]."""
-
 KNEE = ("piecewise_stiffness", "step", "knee_rad")
 """What a gear is whose stiffness changes at a deflection, and its parameters: by how much, and where."""
 

@@ -10,10 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import (
-    PLAY,
-    SPRING_CHANGES,
-)
 from axisight.gap.facts.trace import NONE, UNKNOWN, Adjustment, log_odds
 from axisight.gap.fit.amplitude_significance import amplitude_significance
 from axisight.gap.fit.data_blocks import Layout
@@ -238,13 +234,11 @@ class AxisPosterior:
         Such a gear has play, whichever formula does better: engines and machines end it more softly or harder.
         """
         effect = self.best.trial.fitted.effects[-1]
-        middle = SPRING_CHANGES.get(effect.name, ((),))[0]
-        named = dict(
-            zip((p.name for p in effect_info(effect.name).parameters), effect.values(), strict=True)
-        )
-        if not middle or abs(named[middle[0]]) < _NO_MIDDLE:
+        info = effect_info(effect.name)
+        named = dict(zip((p.name for p in info.parameters), effect.values(), strict=True))
+        if info.spring is None or abs(named[info.spring.sums[0][0]]) < _NO_MIDDLE:
             return self
-        label = Effect(PLAY[0], effect.axis).label
+        label = Effect(info.spring.without_middle, effect.axis).label
         for play in self.ranked[1:]:
             if play.trial.label == label and play.score >= _AS_PLAY * self.best.score:
                 return self.exchanged("play_of_gear", play)

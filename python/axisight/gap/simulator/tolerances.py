@@ -11,7 +11,6 @@ from types import MappingProxyType
 import numpy as np
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import SPRING_CHANGES
 from axisight.fitting import robot_parameters
 from axisight.gap.facts.settings import Settings
 from axisight.robot import Robot, load_robot
@@ -32,9 +31,9 @@ def tolerance_of(tolerances: Mapping[str, float], name: str) -> float | None:
 
 def spring_changes(effect: Effect) -> tuple[float, ...]:
     """Return by what shares of its stiffness [1] a law makes a gear another spring; none of others."""
-    names = [p.name for p in effect_info(effect.name).parameters]
-    values = dict(zip(names, effect.values(), strict=True))
-    sums = SPRING_CHANGES.get(effect.name, ())
+    info = effect_info(effect.name)
+    values = dict(zip((p.name for p in info.parameters), effect.values(), strict=True))
+    sums = () if info.spring is None else info.spring.sums
     return tuple(sum(values[name] for name in names) for names in sums)
 
 
