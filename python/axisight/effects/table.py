@@ -138,6 +138,16 @@ class EffectInfo:
         """Whether it is a delay or lag of the drive, between commanded and applied torque."""
         return self.late and self.acts == "torque_path"
 
+    @property
+    def carried(self) -> bool:
+        """Whether it is mass, inertia or weight: every axis that carries it feels it."""
+        return self.family == "load"
+
+    @property
+    def of_gear(self) -> bool:
+        """Whether it is a law of the gear: a second one may mend the formula of the first."""
+        return self.law_of == "gear"
+
     def marked(self, mark: Mark) -> tuple[str, ...]:
         """Return the names of the parameters with a mark."""
         return tuple(p.name for p in self.parameters if mark in p.marks)

@@ -28,7 +28,6 @@ TO_DO: set[str] = {
     "search/one_for_several.py",
     "search/reported_torque.py",
     "search/stated_effects.py",
-    "search/swap.py",
     "verdict/coarse_encoders.py",
     "verdict/headline.py",
     "verdict/unknown_torque_constants.py",

@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import DRY_FRICTION
 from axisight.fitting.divergence import Diverged, must_hold
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.tolerance_edges import BENT, bent
-from axisight.gap.ranking.posterior import GEAR, AxisPosterior, RankedHypothesis, stand, trial
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis, stand, trial
 from axisight.gap.screening.screening import kept_beside
 from axisight.gap.screening.search_round import settled
 
@@ -117,9 +116,8 @@ def open_rivals(
 
 def alike(one: Effect, other: Effect) -> bool:
     """Whether two effects are laws of one gear, or of one dry friction."""
-    in_gear = all(effect_info(e.name).family == GEAR for e in (one, other))
-    dry = all(DRY_FRICTION[0] in {e.name, *effect_info(e.name).contains} for e in (one, other))
-    return in_gear or dry
+    law = effect_info(one.name).law_of
+    return law is not None and law == effect_info(other.name).law_of
 
 
 def mending(cause: RankedHypothesis, standings: Sequence[AxisPosterior]) -> list[RankedHypothesis]:
