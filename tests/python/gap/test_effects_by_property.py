@@ -21,11 +21,9 @@ ELSE = {
 TO_DO: set[str] = {
     "measure/detection_limits.py",
     "prepare/stiff_bristles.py",
-    "ranking/posterior.py",
     "screening/restart_gear_law.py",
     "screening/restart_stiction.py",
     "screening/restart_uneven_friction.py",
-    "search/one_for_several.py",
     "search/reported_torque.py",
     "search/stated_effects.py",
     "verdict/coarse_encoders.py",

@@ -28,8 +28,6 @@ _INDEPENDENT_BLOCKS = 60.0
 FORMULA_ERROR = 0.02
 """Share of the explained error by which two formulas for one physical effect may differ (tanh or algebraic
 Coulomb, play or dead zone): differences in fit below it say nothing about the cause."""
-GEAR = "transmission"
-"""Family of effects whose laws are many for one gear: a second one may mend the formula of the first."""
 # Log-probability each fitted number costs (Schwarz 1978, with the blocks above).
 _PARAMETER_COST = 0.5 * float(np.log(_INDEPENDENT_BLOCKS))
 

@@ -21,8 +21,6 @@ from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.ranking.posterior import (
-    FORMULA_ERROR,
-    GEAR,
     AxisPosterior,
     FittedHypothesis,
     RankedHypothesis,
@@ -35,11 +33,6 @@ from axisight.gap.ranking.posterior import (
 from axisight.gap.screening.search_round import settled
 
 Array = NDArray[np.float64]
-
-
-# Share of what several explain that one in their place may leave more: by what formulas of a gear differ, and
-# by what is left of other laws, where loads are rigid bodies.
-_DIFFER = {GEAR: FORMULA_ERROR, "load": 1e-4}
 
 
 def one_for_several(
@@ -70,7 +63,7 @@ def one_for_several(
         trials = [t for o in others if (t := _tried(fitter, rest, o, without)) is not None]
         # A load shows on every axis that carries it, and has to do on all.
         place, judged = axis - 1, layout
-        if family == "load":
+        if _is_load(several[0]):
             place, judged = 0, replace(layout, axis=np.zeros_like(layout.axis))
         here = judged.axis == place
         settled_ones = _best_settled(fitter, trials)
@@ -95,7 +88,7 @@ def one_for_several(
             if ranked.trial.label == several[0].effect.label and len(several) == 1:
                 break
             alone = float(ranked.trial.held_out[here].sum())
-            more = _DIFFER.get(family, 0.0) * (none - both)
+            more = _may_leave(several) * (none - both)
             # A lone load needs none of that: no other law has to be imitated.
             mends = not fitter.adds_up and len(several) > 1 and alone - both < more
             mends = mends or (_made_of(ranked, several) and not clearly_worse(alone, both))
@@ -104,6 +97,18 @@ def one_for_several(
             # What leaves more than that is none in their place.
             standing = standing.without(ranked.trial.label)
     return None
+
+
+def _may_leave(several: Sequence[Hypothesis]) -> float:
+    """Return the share of what several explain that one in their place may leave more.
+
+    Of laws of a gear what formulas of it differ by, and of loads, which are rigid bodies, what is left of other
+    laws; of others nothing.
+    """
+    laws = [effect_info(f.effect.name) for f in several]
+    if all(law.of_gear for law in laws) or all(law.carried for law in laws):
+        return min(law.formula.error for law in laws)
+    return 0.0
 
 
 def _made_of(ranked: RankedHypothesis, several: Sequence[Hypothesis]) -> bool:
@@ -139,7 +144,7 @@ def _others(
         first = several[0].effect.name
         return [o for o in new if first in effect_info(o.effect.name).parts and numbers(o) <= count]
     # One of them may do it alone from where it is now, and could not from its start.
-    most = count if family == "load" and len(several) > 1 else count - 1
+    most = count if _is_load(several[0]) and len(several) > 1 else count - 1
     return [o for o in (*new, *several) if numbers(o) <= most]
 
 
@@ -173,11 +178,13 @@ def _lone_load(model: FittedModel, n_axes: int) -> dict[tuple[int, str], list[Hy
     """Return a load with the axis of the link that carries it, where that has no other change of the kind."""
     loads = [f for f in model.free if f.effect.axis is None and _is_load(f)]
     links = [f for f in model.free if f.effect.axis == n_axes and _is_load(f)]
-    return {(n_axes, "load"): loads} if len(loads) == 1 and not links else {}
+    if len(loads) != 1 or links:
+        return {}
+    return {(n_axes, effect_info(loads[0].effect.name).family): loads}
 
 
 def _is_load(free: Hypothesis) -> bool:
-    return effect_info(free.effect.name).family == "load"
+    return effect_info(free.effect.name).carried
 
 
 def _best_settled(
