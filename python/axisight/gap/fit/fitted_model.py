@@ -42,7 +42,8 @@ class Hypothesis:
         return max(least, table.lower), min(most, table.upper)
 
 
-@dataclass(frozen=True)
+# One of them is itself alone: what is computed of it is kept by it.
+@dataclass(frozen=True, eq=False)
 class NormalEquations:
     """Normal equations of a model at given parameters.
 
@@ -99,7 +100,7 @@ class NormalEquations:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FittedModel(NormalEquations):
     """A fitted model and what the data say of it.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,12 +26,26 @@ def held_out_loss(fitted: FittedModel, like: FittedModel | None = None) -> Array
     than their noise. So it is of a model that is compared with one of ``like``, a fit to the same data with
     that effect: the log may be alone with a parameter of the simulator, too.
     """
-    groups = _groups(fitted if like is None else like)
+    kept = _KEPT.setdefault(fitted, WeakKeyDictionary())
+    like = fitted if like is None else like
+    known = kept.get(like)
+    if known is None:
+        known = kept[like] = _held_out_loss(fitted, _groups(like))
+    return known
+
+
+# Held-out losses of models by what their logs are left out like: a search asks for them again and again.
+_KEPT: WeakKeyDictionary[FittedModel, WeakKeyDictionary[FittedModel, Array]] = WeakKeyDictionary()
+
+
+def _held_out_loss(fitted: FittedModel, groups: NDArray[np.int64]) -> Array:
+    """Return the loss of every block (n_blocks,) predicted without its group; not to be written to."""
     out = np.zeros(len(fitted.loss))
     for group in np.unique(groups):
         inside = groups == group
         step = straight_step_without(fitted, inside)
         out[inside] = predicted_loss(fitted, inside, step)
+    out.flags.writeable = False
     return out
 
 

@@ -51,8 +51,7 @@ def _law(**shares: float) -> Callable[[StartContext], Hypothesis]:
 
 
 # Of the top speed of an axis: the corner of dry friction, and the speed over which friction falls.
-_SMOOTHING = 0.003
-_STRIBECK = 0.1
+_SMOOTHING, _STRIBECK = 0.003, 0.1
 # Friction falls with speed over a thousandth to a tenth of the top speed, by grease and load; over more of that of
 # slow motions.
 _STRIBECK_STARTS = (0.003, 0.01, 0.03, 0.3)

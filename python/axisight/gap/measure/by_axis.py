@@ -15,8 +15,8 @@ import numpy as np
 from axisight.fitting.divergence import must_hold
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.fit.settling import settled
 from axisight.gap.measure.gap_figures import Stage
-from axisight.gap.screening.search_round import settled
 from axisight.gap.search.state import SearchState
 
 # Share of what causes change on validation logs, in squares, by which they have to lower the gap

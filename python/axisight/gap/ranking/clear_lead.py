@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from axisight.gap.fit.held_out import linear_gain
+from axisight.gap.fit.settling import SETTLED
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis, are_lags
 
 CLOSE = 0.6
 """Share of the first one's score that a rival needs to be refined: a fit of its own does not make more of the rest."""
-SETTLED = 1e-3
-"""Share of a loss that another step of a fit may promise where it has settled."""
 # One that explains nearly everything, or most of it with none other close, is taken as it is.
 _GOOD_ENOUGH = 0.95
 _ALONE = 0.5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -16,12 +16,12 @@ from axisight.fitting.divergence import Diverged
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
-from axisight.gap.fit.held_out import held_out_loss, linear_gain
+from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.sensitivity import Sensitivity
+from axisight.gap.fit.settling import has_settled, settled
 from axisight.gap.fit.tolerance_edges import BENT, bent
-from axisight.gap.ranking.clear_lead import CLOSE, SETTLED, clear
-from axisight.gap.ranking.drive_lags import ended, lags_beside
+from axisight.gap.ranking.clear_lead import CLOSE, clear
 from axisight.gap.ranking.posterior import (
     AxisPosterior,
     FittedHypothesis,
@@ -34,14 +34,12 @@ from axisight.gap.ranking.posterior import (
 from axisight.gap.screening.column_cache import ColumnCache
 from axisight.gap.screening.partial_fit import TrialFit
 from axisight.gap.screening.promise import HOPELESS, best_by_axis, least_of_the_arm, promising
-from axisight.gap.screening.restart_gear_law import begun_on_curves
 from axisight.gap.screening.restart_look_alike import (
     begun_where_it_ended,
     ended_at_bound,
     more_usual,
 )
-from axisight.gap.screening.restart_stiction import begun_sticking
-from axisight.gap.screening.restart_uneven_friction import begun_wider
+from axisight.gap.screening.restarts import Restarts
 from axisight.gap.screening.screening import Screening, ScreeningModel, Start, thinned
 
 Array = NDArray[np.float64]
@@ -63,8 +61,6 @@ _AT_ONCE = 2
 # The same where the leader bends the simulator.
 _REFINED_BENT = 4
 _FAR = 0.3
-# How often sensitivities are renewed in a fit that is to last.
-_RENEWALS = 1
 # Steps on all data of a fit that was settled on part of them, where it is to be compared only.
 _LOOKS = 2
 # Share of a gain that another candidate may have on the same axis and not count as felt. Nothing gains
@@ -82,45 +78,6 @@ def fresh(options: Sequence[Hypothesis], model: FittedModel, refused: set[str]) 
         if o.effect.label not in present | refused
         and (o.effect.name, o.effect.axis) not in contained
     ]
-
-
-def settled(
-    fitter: ModelFitter,
-    free: Sequence[Hypothesis],
-    start: FittedModel,
-    *,
-    rough: ModelFitter | None = None,
-    max_iterations: int = 6,
-    worth: float | None = None,
-) -> FittedModel | Diverged:
-    """Return a fit with sensitivities of its own, as often renewed as it needs.
-
-    ``rough``: the same for part of the data, which brings what bends the simulator most of the way;
-    ``worth``: loss that another step has to bring, where it is not a share of it.
-    """
-    if start.renewed and len(free) == len(start.free):
-        return _renewed(fitter, start, max_iterations)
-    renewals = _RENEWALS
-    if rough is not None:
-        begun = _renewed(rough, rough.fit(free, start, refreshes=renewals), max_iterations)
-        if not isinstance(begun, Diverged):
-            start, free, renewals = begun, begun.free, 0
-    found = fitter.fit(free, start, refreshes=renewals, worth=worth)
-    return _renewed(fitter, found, max_iterations)
-
-
-def _renewed(
-    fitter: ModelFitter, found: FittedModel | Diverged, max_iterations: int
-) -> FittedModel | Diverged:
-    """Return a fit, with sensitivities renewed at every step where it has not settled without."""
-    if isinstance(found, Diverged) or _has_settled(found):
-        return found
-    return fitter.fit(found.free, found, fresh=True, max_iterations=max_iterations)
-
-
-def _has_settled(found: FittedModel) -> bool:
-    """Whether steps of a fit bring no more."""
-    return found.converged or found.stuck or linear_gain(found) < SETTLED * found.total
 
 
 def _as_much(start: Start) -> float:
@@ -244,81 +201,15 @@ class SearchRound:
         options: Sequence[Hypothesis],
     ) -> list[FittedHypothesis]:
         """Add what is like leaders and has to begin where they ended, or end where they did."""
-        trials = self._with_gears(pool, trials, options)
-        wider = begun_wider(self.standings(trials), trials, self.offered)
-        trials = self._with_better(pool, trials, [(e, o, e.robot_values) for e, o in wider])
-        sticking = begun_sticking(self.standings(trials), options)
-        trials = self._with_better(pool, trials, [(e, o, e.robot_values) for e, o in sticking])
-        return self._with_lags(trials, options)
+        return Restarts(self, pool).added(trials, options)
 
-    def _with_gears(
-        self,
-        pool: ThreadPoolExecutor,
-        trials: list[FittedHypothesis],
-        options: Sequence[Hypothesis],
-    ) -> list[FittedHypothesis]:
-        """Add laws of the gear that another one leads on, begun on its curve; or put them where they fit better.
-
-        One that leads then has a curve of its own.
-        """
-        led: set[str] = set()
-        while begun := begun_on_curves(self.standings(trials), led, options, self.fitter.robot):
-            trials = self._with_better(pool, trials, begun)
-        return trials
-
-    def _with_better(
-        self,
-        pool: ThreadPoolExecutor,
-        trials: Sequence[FittedHypothesis],
-        begun: Sequence[tuple[FittedModel, Hypothesis, Mapping[str, float]]],
-    ) -> list[FittedHypothesis]:
-        """Add what is begun in the place of leaders, or put it where it fits better than it did."""
-        known = {t.label: t for t in trials}
-        for found in pool.map(lambda one: self._in_its_place(*one), begun):
-            if found is not None:
-                before = known.get(found.label)
-                if before is None or found.fitted.total < before.fitted.total:
-                    known[found.label] = found
-        return list(known.values())
-
-    def _with_lags(
-        self, trials: list[FittedHypothesis], options: Sequence[Hypothesis]
-    ) -> list[FittedHypothesis]:
-        """Put delays and lags of axes that one of them leads on where their fits end."""
-        known = {t.label: t for t in trials}
-        for standing in self.standings(trials):
-            if lags := lags_beside(standing):
-                fits = ended(self.fitter, lags, options)
-                found = (trial(fit.free[-1], fit, self.model) for fit in fits)
-                known |= {t.label: t for t in found}
-        return list(known.values())
-
-    def _in_its_place(
-        self, leader: FittedModel, option: Hypothesis, values: Mapping[str, float]
-    ) -> FittedHypothesis | None:
-        """Return a trial begun where a leader ended, in its place; None where it cannot be simulated.
-
-        ``values``: where the simulator's own parameters begin.
-        """
-        part = self.rough or self.fitter
-        free = [*leader.free[:-1], option]
-        found = part.fit(free, leader, robot_values=values, refreshes=_RENEWALS)
-        if not isinstance(found, Diverged):
-            found = settled(part, found.free, found)
-        if part is not self.fitter and not isinstance(found, Diverged):
-            found = self._looked_at(found)
-        if isinstance(found, Diverged):
-            self.skipped.setdefault(option.effect.label, str(found))
-            return None
-        return trial(option, found, self.model)
-
-    def _looked_at(self, begun: FittedModel) -> FittedModel | Diverged:
+    def looked_at(self, begun: FittedModel) -> FittedModel | Diverged:
         """Return a fit to part of the data as all of them have it."""
         found = self.fitter.fit(begun.free, begun, max_iterations=_LOOKS)
         if isinstance(found, Diverged):
             return found
         # What is taken in is fitted on where it has not settled.
-        return replace(found, renewed=found.renewed and _has_settled(found))
+        return replace(found, renewed=found.renewed and has_settled(found))
 
     def run_waiting(
         self, trials: list[FittedHypothesis], options: Sequence[Hypothesis], number: int
@@ -488,7 +379,7 @@ class SearchRound:
             needed = CLOSE * _taken_away(leader, self.model, axis - 1)
             if _taken_away(begun, self.screen.model, axis - 1) < needed:
                 return None
-        return self._looked_at(begun)
+        return self.looked_at(begun)
 
     def _crooked(self, trials: Sequence[FittedHypothesis]) -> set[int]:
         """Return the axes (from 0) whose leader bends the simulator: its rivals were tried on a bent one."""

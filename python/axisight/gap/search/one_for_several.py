@@ -20,6 +20,7 @@ from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.fit.settling import settled
 from axisight.gap.ranking.posterior import (
     AxisPosterior,
     FittedHypothesis,
@@ -30,7 +31,6 @@ from axisight.gap.ranking.posterior import (
     stand,
     trial,
 )
-from axisight.gap.screening.search_round import settled
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import held_out_loss, linear_gain
 from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.fit.settling import settled
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis, stand, trial
-from axisight.gap.screening.search_round import settled
 from axisight.gap.search.one_for_several import one_for_several
 from axisight.gap.search.state import OPEN, Round, SearchState
 from axisight.gap.search.swap import (

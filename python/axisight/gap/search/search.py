@@ -15,6 +15,7 @@ from axisight.gap.fit.data_blocks import layout_of
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.fit.settling import settled
 from axisight.gap.ranking.posterior import (
     FORMULA_ERROR,
     AxisPosterior,
@@ -26,7 +27,7 @@ from axisight.gap.ranking.posterior import (
 from axisight.gap.screening.column_cache import ColumnCache
 from axisight.gap.screening.promise import HOPELESS
 from axisight.gap.screening.screening import kept_beside
-from axisight.gap.screening.search_round import Progress, SearchRound, fresh, interact, settled
+from axisight.gap.screening.search_round import Progress, SearchRound, fresh, interact
 from axisight.gap.search.pairs import Pairs, in_parts, without_rival_composites
 from axisight.gap.search.revision import (
     drop_idle,

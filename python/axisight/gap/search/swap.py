@@ -19,10 +19,10 @@ from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.fit.settling import settled
 from axisight.gap.fit.tolerance_edges import BENT, bent
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis, stand, trial
 from axisight.gap.screening.screening import kept_beside
-from axisight.gap.screening.search_round import settled
 
 Array = NDArray[np.float64]
 Found = tuple[RankedHypothesis, AxisPosterior]

@@ -7,9 +7,10 @@ from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
+import xarray as xr
 
 from axisight.gap.facts.faults import Finding
-from axisight.gap.facts.result import Cause, Diagnosis, Interval, MotionErrors
+from axisight.gap.facts.result import Cause, Diagnosis, Interval, MotionErrors, Where
 from axisight.gap.facts.settings import Settings
 from axisight.gap.facts.simulator_variant import Variant
 from axisight.gap.fit.fitted_model import FittedModel
@@ -49,37 +50,17 @@ def assembled(
 
     ``noted``: findings of the logs before anything was fitted.
     """
-    found, conclusion, reach, own = seen.found, seen.conclusion, seen.reach, seen.own
+    found, reach = seen.found, seen.reach
     bands = band_map(seen.errors, settings.block_s)
     regimes = regime_maps(seen.errors, settings.bandwidth_hz, settings.block_s)
     gap = gap_figures(reach.stages, one_unit=len(set(robot.axis_is_prismatic)) == 1)
     gap = replace(gap, motion=_motion(view, held_logs, seen, noted))
-    judged = gap_figures(reach.judged)
     names = [log.name for log in held_logs]
     nominal, tolerances = nominal_values(robot), view.fitter.tolerances
-    share = bent_for(view.fitter, found)
-    left = remainder_of(reach.judged, judged, reach.left, settings)
-    removed = view.removed_there(found, held_logs) if conclusion.causes else None
-    steps = encoder_steps(view.robot, view.logs)
-    conclusion = carried_over(
-        conclusion, reach.judged, judged, names, settings, own, share, removed, steps > 0
-    )
-    measured = [view.measured(log) for log in held_logs]
-    conclusion, of_steps = with_coarse_encoders(
-        conclusion,
-        steps,
-        view,
-        held_logs,
-        reach.judged,
-        lambda errors: stage(held_logs, errors, settings.block_s, measured),
-    )
-    conclusion, unfelt = with_controllers_shown(conclusion, view)
-    causes = _causes(conclusion, [*reach.reductions, *of_steps, *unfelt])
-    maps = (bands, regimes, settings.significance)
-    places = findings(*maps) if conclusion.verdict != "none" else ()
-    excess = np.array([axis.excess for axis in conclusion.axes])
-    if conclusion.verdict == "unknown" and excess.max() > settings.largest_scatter:
-        places = led_by_weight(places, *maps, excess)
+    left = remainder_of(reach.judged, gap_figures(reach.judged), reach.left, settings)
+    conclusion, reductions = _concluded(view, held_logs, seen, settings)
+    causes = _causes(conclusion, reductions)
+    places = _places(conclusion, (bands, regimes, settings.significance), settings)
     # Where nothing was named, `after` is the simulator re-fitted alone.
     fitted = found.model if reach.reductions else found.baseline
     refit = {k: _relative(robot, fitted, k) for k in fitted.robot_values}
@@ -123,6 +104,52 @@ def assembled(
         trace=replace(trace_of(found), named=tuple(x for c in conclusion.causes for x in c.ledger)),
         provenance=_provenance(robot, view, names, settings),
     )
+
+
+def _concluded(
+    view: View, held_logs: Sequence[Log], seen: Validated, settings: Settings
+) -> tuple[Conclusion, list[Interval]]:
+    """Return the conclusion as it holds on the validation logs, and what each cause reduces the gap by there."""
+    found, reach = seen.found, seen.reach
+    names = [log.name for log in held_logs]
+    share = bent_for(view.fitter, found)
+    removed = view.removed_there(found, held_logs) if seen.conclusion.causes else None
+    steps = encoder_steps(view.robot, view.logs)
+    conclusion = carried_over(
+        seen.conclusion,
+        reach.judged,
+        gap_figures(reach.judged),
+        names,
+        settings,
+        seen.own,
+        share,
+        removed,
+        steps > 0,
+    )
+    measured = [view.measured(log) for log in held_logs]
+    conclusion, of_steps = with_coarse_encoders(
+        conclusion,
+        steps,
+        view,
+        held_logs,
+        reach.judged,
+        lambda errors: stage(held_logs, errors, settings.block_s, measured),
+    )
+    conclusion, unfelt = with_controllers_shown(conclusion, view)
+    return conclusion, [*reach.reductions, *of_steps, *unfelt]
+
+
+def _places(
+    conclusion: Conclusion,
+    maps: tuple[xr.Dataset, dict[str, xr.Dataset], float],
+    settings: Settings,
+) -> tuple[Where, ...]:
+    """Return where the gap lies; nowhere where there is none."""
+    places = findings(*maps) if conclusion.verdict != "none" else ()
+    excess = np.array([axis.excess for axis in conclusion.axes])
+    if conclusion.verdict == "unknown" and excess.max() > settings.largest_scatter:
+        places = led_by_weight(places, *maps, excess)
+    return places
 
 
 def _causes(conclusion: Conclusion, reductions: Sequence[Interval]) -> tuple[Cause, ...]:

@@ -179,7 +179,7 @@ def test_a_rival_left_far_behind_on_part_of_the_data_is_not_looked_at_on_all(
 
     looked: list[str] = []
     monkeypatch.setattr(search_round, "settled", lambda *_: fit_of(rival))
-    monkeypatch.setattr(search_round, "_has_settled", lambda _: True)
+    monkeypatch.setattr(search_round, "has_settled", lambda _: True)
     monkeypatch.setattr(search_round, "replace", lambda found, renewed: found)
     whole = SimpleNamespace(fit=lambda *_, **__: looked.append(rival) or fit_of(rival))
     field = SimpleNamespace(
@@ -188,7 +188,7 @@ def test_a_rival_left_far_behind_on_part_of_the_data_is_not_looked_at_on_all(
         screen=SimpleNamespace(model=fit_of("none")),
         fitter=whole,
     )
-    field._looked_at = partial(SearchRound._looked_at, field)
+    field.looked_at = partial(SearchRound.looked_at, field)
     found = SearchRound._compared(field, fit_of("none"), fit_of("leader"))
     assert (found is not None) == looked_at == bool(looked)
     # A leader is looked at, however little it takes away.

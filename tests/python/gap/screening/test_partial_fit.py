@@ -9,9 +9,9 @@ from axisight import Effect, Settings
 from axisight.gap.fit.data_blocks import layout_of
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import held_out_loss
+from axisight.gap.fit.settling import settled
 from axisight.gap.screening.partial_fit import Begun, TrialFit
 from axisight.gap.screening.screening import Screening, ScreeningModel, Start, thinned
-from axisight.gap.screening.search_round import settled
 from axisight.gap.search.search import _refitted
 from axisight.gap.views.closed_loop import ClosedLoopView
 from gap_data import bare_axis, logs_of, scattered

@@ -1,0 +1,124 @@
+"""Hypotheses begun where the fit of a leader ended, in its place.
+
+Some valleys are too narrow for a start of their own: a law of a gear is begun on the curve of another one, bristles
+that stick where those that do not ended, uneven friction where even friction did. Of several starts of one
+hypothesis those are fitted that promise most by one linear step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING
+
+from axisight.fitting.divergence import Diverged
+from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
+from axisight.gap.fit.held_out import linear_gain
+from axisight.gap.fit.settling import RENEWALS, settled
+from axisight.gap.ranking.drive_lags import ended, lags_beside
+from axisight.gap.ranking.posterior import FittedHypothesis, trial
+from axisight.gap.screening.restart_gear_law import begun_on_curves
+from axisight.gap.screening.restart_stiction import begun_sticking
+from axisight.gap.screening.restart_uneven_friction import begun_wider
+
+if TYPE_CHECKING:
+    from axisight.gap.screening.search_round import SearchRound
+
+Restart = tuple[FittedModel, Hypothesis, Mapping[str, float]]
+"""The model whose last effect is replaced, by what, and where the simulator's own parameters begin."""
+
+# Starts of one hypothesis that are fitted: the first by promise, and one that may lie in another valley.
+_FITTED = 2
+
+
+class Restarts:
+    """What is like the leaders of a round and has to begin where they ended."""
+
+    def __init__(self, of: SearchRound, pool: ThreadPoolExecutor) -> None:
+        self.round, self.pool = of, pool
+
+    def added(
+        self, trials: list[FittedHypothesis], options: Sequence[Hypothesis]
+    ) -> list[FittedHypothesis]:
+        """Return the trials with what was begun in the place of leaders, where that fits better."""
+        here = self.round
+        trials = self._with_gears(trials, options)
+        wider = begun_wider(here.standings(trials), trials, here.offered)
+        trials = self._with_better(trials, [(e, o, e.robot_values) for e, o in wider])
+        sticking = begun_sticking(here.standings(trials), options)
+        trials = self._with_better(trials, [(e, o, e.robot_values) for e, o in sticking])
+        return self._with_lags(trials, options)
+
+    def _with_gears(
+        self, trials: list[FittedHypothesis], options: Sequence[Hypothesis]
+    ) -> list[FittedHypothesis]:
+        """Add laws of the gear that another one leads on, begun on its curve; or put them where they fit better.
+
+        One that leads then has a curve of its own.
+        """
+        led: set[str] = set()
+        here = self.round
+        while begun := begun_on_curves(here.standings(trials), led, options, here.fitter.robot):
+            trials = self._with_better(trials, begun)
+        return trials
+
+    def _with_better(
+        self, trials: Sequence[FittedHypothesis], begun: Sequence[Restart]
+    ) -> list[FittedHypothesis]:
+        """Add what is begun in the place of leaders, or put it where it fits better than it did."""
+        known = {t.label: t for t in trials}
+        for found in self.pool.map(lambda one: self._fitted(*one), self._promising(begun)):
+            if found is not None:
+                before = known.get(found.label)
+                if before is None or found.fitted.total < before.fitted.total:
+                    known[found.label] = found
+        return list(known.values())
+
+    def _promising(self, begun: Sequence[Restart]) -> list[Restart]:
+        """Return the restarts, of several of one hypothesis those that promise most by one linear step."""
+        by_label: dict[str, list[Restart]] = {}
+        for one in begun:
+            by_label.setdefault(one[1].effect.label, []).append(one)
+        crowded = [one for same in by_label.values() if len(same) > _FITTED for one in same]
+        promised = dict(zip(map(id, crowded), self.pool.map(self._promised, crowded), strict=True))
+        return [
+            one
+            for same in by_label.values()
+            for one in sorted(same, key=lambda x: promised.get(id(x), 0.0))[:_FITTED]
+        ]
+
+    def _promised(self, one: Restart) -> float:
+        """Return the loss that one linear step from a restart leads to; infinite where it does not hold."""
+        leader, option, values = one
+        part = self.round.rough or self.round.fitter
+        at = part.evaluate([*leader.free[:-1], option], leader, robot_values=values)
+        return float("inf") if isinstance(at, Diverged) else at.total - linear_gain(at)
+
+    def _with_lags(
+        self, trials: list[FittedHypothesis], options: Sequence[Hypothesis]
+    ) -> list[FittedHypothesis]:
+        """Put delays and lags of axes that one of them leads on where their fits end."""
+        known = {t.label: t for t in trials}
+        for standing in self.round.standings(trials):
+            if lags := lags_beside(standing):
+                fits = ended(self.round.fitter, lags, options)
+                found = (trial(fit.free[-1], fit, self.round.model) for fit in fits)
+                known |= {t.label: t for t in found}
+        return list(known.values())
+
+    def _fitted(
+        self, leader: FittedModel, option: Hypothesis, values: Mapping[str, float]
+    ) -> FittedHypothesis | None:
+        """Return a trial begun where a leader ended, in its place; None where it cannot be simulated."""
+        here = self.round
+        part = here.rough or here.fitter
+        free = [*leader.free[:-1], option]
+        found = part.fit(free, leader, robot_values=values, refreshes=RENEWALS)
+        if not isinstance(found, Diverged):
+            found = settled(part, found.free, found)
+        if part is not here.fitter and not isinstance(found, Diverged):
+            found = here.looked_at(found)
+        if isinstance(found, Diverged):
+            here.skipped.setdefault(option.effect.label, str(found))
+            return None
+        return trial(option, found, here.model)
