@@ -7,25 +7,46 @@ hypothesis those are fitted that promise most by one linear step.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import linear_gain
+from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.settling import RENEWALS, settled
 from axisight.gap.ranking.drive_lags import ended, lags_beside
-from axisight.gap.ranking.posterior import FittedHypothesis, trial
+from axisight.gap.ranking.posterior import AxisPosterior, FittedHypothesis, trial
 from axisight.gap.screening.restart_gear_law import begun_on_curves
 from axisight.gap.screening.restart_stiction import begun_sticking
 from axisight.gap.screening.restart_uneven_friction import begun_wider
 
-if TYPE_CHECKING:
-    from axisight.gap.screening.search_round import SearchRound
-
 Restart = tuple[FittedModel, Hypothesis, Mapping[str, float]]
 """The model whose last effect is replaced, by what, and where the simulator's own parameters begin."""
+
+
+class Field(Protocol):
+    """The round whose leaders are replaced; see `SearchRound`."""
+
+    fitter: ModelFitter
+    model: FittedModel
+    offered: Callable[[FittedModel], Sequence[Hypothesis]]
+
+    @property
+    def rough(self) -> ModelFitter | None:
+        """The fitter for part of the data; None where that is all."""
+
+    @property
+    def skipped(self) -> dict[str, str]:
+        """Candidates that failed, with the reason."""
+
+    def standings(self, trials: Sequence[FittedHypothesis]) -> list[AxisPosterior]:
+        """Return how the trials stand on each axis."""
+
+    def looked_at(self, begun: FittedModel) -> FittedModel | Diverged:
+        """Return a fit to part of the data as all of them have it."""
+
 
 # Starts of one hypothesis that are fitted: the first by promise, and one that may lie in another valley.
 _FITTED = 2
@@ -34,7 +55,7 @@ _FITTED = 2
 class Restarts:
     """What is like the leaders of a round and has to begin where they ended."""
 
-    def __init__(self, of: SearchRound, pool: ThreadPoolExecutor) -> None:
+    def __init__(self, of: Field, pool: ThreadPoolExecutor) -> None:
         self.round, self.pool = of, pool
 
     def added(
