@@ -25,25 +25,22 @@ __all__ = [
     "FitResult",
     "FrequencyFitResult",
     "Linearization",
+    "MeasuredMotions",
     "MonteCarloEnsemble",
     "MonteCarloStudy",
     "Robot",
+    "SimulatedLogs",
     "__version__",
     "axis_fit",
     "axis_linearize",
     "axis_simulate",
     "check_integrator",
-    "courses",
     "design_poses",
     "directions",
     "effect_table",
     "energy_regressor",
-    "evaluate_inverse_dynamics",
-    "evaluate_simulation",
     "failure_kinds",
     "fit_frequency_responses",
-    "fit_inverse_dynamics",
-    "fit_simulation",
     "frequency_information",
     "frequency_response",
     "frf_local_model",
@@ -290,8 +287,7 @@ class OptionSpec(Protocol):
 
     ``loss`` is "squared", "huber" or "soft_l1"; ``loss_scale`` is in standard deviations.
     ``loss_tolerance`` is a share of the loss, ``step_tolerance`` a share of each parameter's
-    scale. ``block_s`` [s] is the length of the blocks of `FitResult.blocks`.
-    `fit_inverse_dynamics` ignores the integrator.
+    scale.
     """
 
     @property
@@ -306,10 +302,6 @@ class OptionSpec(Protocol):
     def loss_scale(self) -> float: ...
     @property
     def nuisance_refreshes(self) -> int: ...
-    @property
-    def block_s(self) -> float: ...
-    @property
-    def integrator(self) -> IntegratorSpec: ...
 
 @final
 class CancelToken:
@@ -488,7 +480,7 @@ class Column:
 
 @final
 class Courses:
-    """Runs of a model over all logs, for models close to it; see `courses`."""
+    """Runs of a model over all logs, for models close to it; see `SimulatedLogs.run`."""
 
 @final
 class Diverged:
@@ -842,21 +834,9 @@ def measurement_noise(
     A function of ``seed``, ``run`` and axis alone, so that any run can be made again.
     """
 
-def fit_simulation(
-    robot: Robot,
-    effects: _Effects,
-    parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None, int]],
-    weighting: Sequence[_Weighting],
-    options: OptionSpec,
-    *,
-    input: Literal["reference", "torque", "tracking"] = "reference",
-    output: Literal["torque", "position"] = "torque",
-    warm: Sequence[tuple[int, Column]] = ...,
-    courses: Courses | None = None,
-    cancel: CancelToken | None = None,
-) -> FitResult | Diverged:
-    """Fit a free-running simulation to logs.
+@final
+class SimulatedLogs:
+    """Logs that a robot is simulated along: converted once, for any number of fits.
 
     ``records`` are (input, target, certainty, start, lead), the first three of shape (n_samples, n_axes), one
     per log: a velocity reference [rad/s] or commanded torque [Nm], and a commanded torque [Nm] or
@@ -864,83 +844,111 @@ def fit_simulation(
     factor on the weighted error of its sample, None for one everywhere. Every run begins at rest, at
     ``start`` (n_axes,) [rad], None for the operating point; the first ``lead`` samples of input and target,
     of which the certainty has none, are simulated and not compared. ``weighting`` has one entry per axis.
-    ``warm`` gives Jacobian columns (n_residuals,) of nuisance parameters from an earlier fit, by
-    parameter index (from 0).
+    ``block_s`` [s] is the length of the blocks of `FitResult.blocks`; ``integrator`` by default rk4 with one
+    step a sample.
     """
 
-def fit_inverse_dynamics(
-    robot: Robot,
-    effects: _Effects,
-    parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array, _Array, _Array]],
-    weighting: Sequence[_Weighting],
-    options: OptionSpec,
-    *,
-    warm: Sequence[tuple[int, Column]] = ...,
-    cancel: CancelToken | None = None,
-) -> FitResult | Diverged:
-    """Fit the torque predicted from measured motions, transmissions taken as rigid.
+    def __new__(
+        cls,
+        robot: Robot,
+        records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None, int]],
+        weighting: Sequence[_Weighting],
+        *,
+        input: Literal["reference", "torque", "tracking"] = "reference",
+        output: Literal["torque", "position"] = "torque",
+        block_s: float = 1.0,
+        integrator: IntegratorSpec | None = None,
+    ) -> SimulatedLogs: ...
+    def part(self, logs: Sequence[int]) -> SimulatedLogs:
+        """Return the same of some logs, by their numbers (from 0)."""
+    def first(self, samples: Sequence[int]) -> SimulatedLogs:
+        """Return the same of the first so many samples of each log that are compared, (n_logs,)."""
+    def fit(
+        self,
+        effects: _Effects,
+        parameters: Sequence[ParameterSpec],
+        options: OptionSpec,
+        *,
+        warm: Sequence[tuple[int, Column]] = ...,
+        courses: Courses | None = None,
+        cancel: CancelToken | None = None,
+    ) -> FitResult | Diverged:
+        """Fit a free-running simulation to the logs.
+
+        ``warm`` gives Jacobian columns (n_residuals,) of nuisance parameters from an earlier fit, by
+        parameter index (from 0).
+        """
+    def evaluate(
+        self,
+        effects: _Effects,
+        parameters: Sequence[ParameterSpec],
+        options: OptionSpec,
+        *,
+        warm: Sequence[tuple[int, Column]] = ...,
+        courses: Courses | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Linearization | Diverged:
+        """Compare a free-running simulation with the logs at the initial values of the parameters.
+
+        Columns of parameters in ``warm`` are taken from there.
+        """
+    def run(
+        self,
+        effects: _Effects,
+        parameters: Sequence[ParameterSpec],
+        *,
+        cancel: CancelToken | None = None,
+    ) -> Courses | Diverged:
+        """Run a model over all logs, at the initial values of the parameters.
+
+        Models close to it are then evaluated with the arm linearised along these runs, at a fraction of
+        the cost; the result may be used for the same logs only.
+        """
+
+@final
+class MeasuredMotions:
+    """Measured motions that torques are predicted from, transmissions taken as rigid: converted once.
 
     ``records`` are (position [rad], velocity [rad/s], acceleration [rad/s^2], torque [Nm],
-    certainty [1]) of shape (n_samples, n_axes), motor side, one per log; the certainty, from 0 to 1,
-    is a factor on the weighted error of its sample. ``weighting`` has one entry per axis.
-    ``warm`` holds Jacobian columns from an earlier fit, as for `fit_simulation`.
-    ``cancel`` has no effect yet: the fit runs to its end and Ctrl-C is raised then.
+    certainty [1]) of shape (n_samples, n_axes), motor side, one per log; the certainty is a factor on the
+    weighted error of its sample. ``weighting`` and ``block_s`` as for `SimulatedLogs`.
     """
 
-def evaluate_simulation(
-    robot: Robot,
-    effects: _Effects,
-    parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None, int]],
-    weighting: Sequence[_Weighting],
-    options: OptionSpec,
-    *,
-    input: Literal["reference", "torque", "tracking"] = "reference",
-    output: Literal["torque", "position"] = "torque",
-    warm: Sequence[tuple[int, Column]] = ...,
-    courses: Courses | None = None,
-    cancel: CancelToken | None = None,
-) -> Linearization | Diverged:
-    """Compare a free-running simulation with logs at the initial values of the parameters.
+    def __new__(
+        cls,
+        robot: Robot,
+        records: Sequence[tuple[_Array, _Array, _Array, _Array, _Array]],
+        weighting: Sequence[_Weighting],
+        *,
+        block_s: float = 1.0,
+    ) -> MeasuredMotions: ...
+    def part(self, logs: Sequence[int]) -> MeasuredMotions:
+        """Return the same of some motions, by their numbers (from 0)."""
+    def with_certainty(self, certainty: Sequence[_Array]) -> MeasuredMotions:
+        """Return the same motions with another certainty, (n_samples, n_axes) one per log."""
+    def fit(
+        self,
+        effects: _Effects,
+        parameters: Sequence[ParameterSpec],
+        options: OptionSpec,
+        *,
+        warm: Sequence[tuple[int, Column]] = ...,
+        cancel: CancelToken | None = None,
+    ) -> FitResult | Diverged:
+        """Fit the predicted torque; ``warm`` as for `SimulatedLogs.fit`.
 
-    Arguments as for `fit_simulation`; columns of parameters in ``warm`` are taken from there.
-    """
-
-def courses(
-    robot: Robot,
-    effects: _Effects,
-    parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array | None, _Numbers | None, int]],
-    weighting: Sequence[_Weighting],
-    options: OptionSpec,
-    *,
-    input: Literal["reference", "torque", "tracking"] = "reference",
-    output: Literal["torque", "position"] = "torque",
-    cancel: CancelToken | None = None,
-) -> Courses | Diverged:
-    """Run a model over all logs, at the initial values of the parameters.
-
-    Arguments as for `fit_simulation`. Models close to it are then evaluated with the arm
-    linearised along these runs, at a fraction of the cost; the result may be used for
-    the same logs only.
-    """
-
-def evaluate_inverse_dynamics(
-    robot: Robot,
-    effects: _Effects,
-    parameters: Sequence[ParameterSpec],
-    records: Sequence[tuple[_Array, _Array, _Array, _Array, _Array]],
-    weighting: Sequence[_Weighting],
-    options: OptionSpec,
-    *,
-    warm: Sequence[tuple[int, Column]] = ...,
-    cancel: CancelToken | None = None,
-) -> Linearization | Diverged:
-    """Predict the torque of measured motions at the initial values of the parameters.
-
-    Arguments as for `fit_inverse_dynamics`; the residual is prediction minus measurement.
-    """
+        ``cancel`` has no effect yet: the fit runs to its end and Ctrl-C is raised then.
+        """
+    def evaluate(
+        self,
+        effects: _Effects,
+        parameters: Sequence[ParameterSpec],
+        options: OptionSpec,
+        *,
+        warm: Sequence[tuple[int, Column]] = ...,
+        cancel: CancelToken | None = None,
+    ) -> Linearization | Diverged:
+        """Predict the torques at the initial values; the residual is prediction minus measurement."""
 
 @type_check_only
 class MonteCarloBlock(TypedDict):

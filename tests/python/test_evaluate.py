@@ -41,12 +41,10 @@ def parameters(robot: Robot) -> list[Parameter]:
 
 def test_simulation_is_that_of_a_fit_without_steps(robot, record):
     chosen = parameters(robot)
-    arguments = (
-        robot.core, core_effects(EFFECTS), [core_spec(p, EFFECTS) for p in chosen], [record],
-        Weighting.flat(1).core(),
-    )  # fmt: skip
-    at = _core.evaluate_simulation(*arguments, FitOptions(block_s=0.1))
-    fit = _core.fit_simulation(*arguments, FitOptions(block_s=0.1, max_iterations=0))
+    logs = _core.SimulatedLogs(robot.core, [record], Weighting.flat(1).core(), block_s=0.1)
+    arguments = core_effects(EFFECTS), [core_spec(p, EFFECTS) for p in chosen]
+    at = logs.evaluate(*arguments, FitOptions())
+    fit = logs.fit(*arguments, FitOptions(max_iterations=0))
     assert fit.status == "max_iterations" and fit.evaluations == 1
     assert (at.free, at.at_bound, at.blocks) == (fit.free, fit.at_bound, fit.blocks)
     assert at.loss == fit.loss
@@ -56,12 +54,11 @@ def test_simulation_is_that_of_a_fit_without_steps(robot, record):
 
 def test_jacobian_is_the_slope_of_the_residual(robot, record):
     chosen = parameters(robot)
+    logs = _core.SimulatedLogs(robot.core, [record], Weighting.flat(1).core())
 
     def at(moved: list[Parameter]) -> _core.Linearization:
         specs = [core_spec(p, EFFECTS) for p in moved]
-        effects = core_effects(EFFECTS)
-        flat = Weighting.flat(1).core()
-        return _core.evaluate_simulation(robot.core, effects, specs, [record], flat, FitOptions())
+        return logs.evaluate(core_effects(EFFECTS), specs, FitOptions())
 
     jacobian = at(chosen).jacobian
     step = 1e-5 * chosen[0].initial
@@ -76,10 +73,14 @@ def test_jacobian_is_the_slope_of_the_residual(robot, record):
 
 def weighted(robot: Robot, record, weighting: Weighting) -> _core.Linearization:
     chosen = parameters(robot)
-    return _core.evaluate_simulation(
-        robot.core, core_effects(EFFECTS), [core_spec(p, EFFECTS) for p in chosen], [record],
-        weighting.core(), FitOptions(block_s=0.1),
-    )  # fmt: skip
+    logs = _core.SimulatedLogs(robot.core, [record], weighting.core(), block_s=0.1)
+    specs = [core_spec(p, EFFECTS) for p in chosen]
+    return logs.evaluate(core_effects(EFFECTS), specs, FitOptions())
+
+
+def predicted(robot: Robot, motion, weighting: Weighting) -> _core.Linearization:
+    motions = _core.MeasuredMotions(robot.core, [motion], weighting.core())
+    return motions.evaluate([], [], FitOptions())
 
 
 # A loop's: low where the torque is large; 1500 is no multiple of the decimation.
@@ -100,9 +101,7 @@ def test_certainty_is_a_factor_on_the_weighted_error_of_a_predicted_torque(robot
     noise = np.random.default_rng(0).normal(size=(1500, 1))
     certainty = np.linspace(0.0, 1.0, 1500)[:, None]
     whole, part = (
-        _core.evaluate_inverse_dynamics(
-            robot.core, [], [], [(moved, moved, moved, noise, factor)], LOOP.core(), FitOptions()
-        ).residual
+        predicted(robot, (moved, moved, moved, noise, factor), LOOP).residual
         for factor in (np.ones_like(certainty), certainty)
     )
     np.testing.assert_array_equal(part, whole * certainty[: 1500 // 7 * 7 : 7, 0])
@@ -120,14 +119,8 @@ def test_what_is_no_certainty_is_refused(robot, record, certainty):
 def test_weighting_of_a_signal_is_that_of_the_core(robot, record, weighting):
     moved = np.zeros((1500, 1))
     noise = np.random.default_rng(0).normal(size=(1500, 1)).cumsum(axis=0)
-    core = _core.evaluate_inverse_dynamics(
-        robot.core, [], [], [(moved, moved, moved, noise, moved + 1)],
-        weighting.core(), FitOptions(),
-    )  # fmt: skip
-    flat = _core.evaluate_inverse_dynamics(
-        robot.core, [], [], [(moved, moved, moved, noise, moved + 1)],
-        Weighting.flat(1).core(), FitOptions(),
-    )  # fmt: skip
+    motion = (moved, moved, moved, noise, moved + 1)
+    core, flat = (predicted(robot, motion, w) for w in (weighting, Weighting.flat(1)))
     ours = weighting.of(flat.residual[:, None], robot.sample_time_s)[:, 0]
     # Rounding of two transforms of 3000 points.
     np.testing.assert_allclose(ours, core.residual, atol=1e-11 * np.abs(ours).max())
@@ -137,18 +130,77 @@ def test_torque_of_a_motion_is_predicted(robot):
     rng = np.random.default_rng(0)
     moved = [np.ascontiguousarray(rng.normal(size=(300, 1))) for _ in range(3)]
     still = np.zeros((300, 1))
-    arguments = (robot.core, [], [])
-    flat = Weighting.flat(1).core()
-    torque = _core.evaluate_inverse_dynamics(
-        *arguments, [(*moved, still, still + 1)], flat, FitOptions()
-    ).residual
+    flat = Weighting.flat(1)
+    torque = predicted(robot, (*moved, still, still + 1), flat).residual
     # What is predicted, measured: nothing is left.
-    exact = _core.evaluate_inverse_dynamics(
-        *arguments, [(*moved, torque[:, None], still + 1)], flat, FitOptions()
-    )
+    exact = predicted(robot, (*moved, torque[:, None], still + 1), flat)
     assert np.abs(torque).max() > 1e-3
     np.testing.assert_allclose(exact.residual, 0.0, atol=1e-12 * np.abs(torque).max())
     assert exact.jacobian.size == 0 and exact.free == []
+
+
+@pytest.fixture(scope="module")
+def three(robot: Robot, record) -> tuple[list, _core.SimulatedLogs]:
+    """Logs of three sizes, as they are and as the core keeps them."""
+    certainty = np.linspace(0.2, 1.0, 1500)[:, None]
+    records = [(record[0] * size, record[1] * size, certainty, None, 0) for size in (1, 0.5, 2)]
+    return records, _core.SimulatedLogs(robot.core, records, LOOP.core())
+
+
+def same(one: _core.SimulatedLogs, other: _core.SimulatedLogs, robot: Robot) -> None:
+    specs = [core_spec(p, EFFECTS) for p in parameters(robot)]
+    one_at, other_at = (
+        x.evaluate(core_effects(EFFECTS), specs, FitOptions()) for x in (one, other)
+    )
+    np.testing.assert_array_equal(one_at.residual, other_at.residual)
+    np.testing.assert_array_equal(one_at.jacobian, other_at.jacobian)
+
+
+def test_some_of_the_logs_are_those_made_ready_alone(robot, three):
+    records, logs = three
+    alone = _core.SimulatedLogs(robot.core, [records[2], records[0]], LOOP.core())
+    same(logs.part([2, 0]), alone, robot)
+    with pytest.raises(InputError, match="logs: expected numbers below 3, got 3"):
+        logs.part([0, 3])
+    with pytest.raises(InputError, match="logs: expected at least one, got none"):
+        logs.part([])
+
+
+def test_beginnings_of_logs_are_those_made_ready_cut(robot, three):
+    records, logs = three
+    sizes = [800, 9, 1500]
+    cut = [(r[:n], t[:n], c[:n], *at) for (r, t, c, *at), n in zip(records, sizes, strict=True)]
+    same(logs.first(sizes), _core.SimulatedLogs(robot.core, cut, LOOP.core()), robot)
+    for samples in ([800, 9], [800, 9, 1501], [800, 0, 9]):
+        with pytest.raises(InputError, match=r"samples: expected from 1 to \[1500, 1500, 1500\]"):
+            logs.first(samples)
+
+
+def test_samples_that_lead_to_a_beginning_stay(robot, record):
+    led = (*record[:2], None, None, 200)
+    cut = (record[0][:700], record[1][:700], None, None, 200)
+    logs = _core.SimulatedLogs(robot.core, [led], LOOP.core())
+    same(logs.first([500]), _core.SimulatedLogs(robot.core, [cut], LOOP.core()), robot)
+
+
+def test_motions_keep_what_is_not_said_anew(robot):
+    rng = np.random.default_rng(0)
+    whole = [[rng.normal(size=(300, 1)) for _ in range(4)] for _ in range(2)]
+    one, half = np.ones((300, 1)), np.full((300, 1), 0.5)
+    flat = Weighting.flat(1).core()
+
+    def residual(motions: _core.MeasuredMotions) -> np.ndarray:
+        return motions.evaluate([], [], FitOptions()).residual
+
+    kept = _core.MeasuredMotions(robot.core, [(*m, one) for m in whole], flat)
+    anew = _core.MeasuredMotions(robot.core, [(*m, half) for m in whole], flat)
+    np.testing.assert_array_equal(residual(kept.with_certainty([half, half])), residual(anew))
+    last = _core.MeasuredMotions(robot.core, [(*whole[1], one)], flat)
+    np.testing.assert_array_equal(residual(kept.part([1])), residual(last))
+    with pytest.raises(InputError, match="certainty: expected one array for each of 2 motions"):
+        kept.with_certainty([half])
+    with pytest.raises(InputError, match=r"records\[1\].certainty: expected 300 numbers"):
+        kept.with_certainty([half, half[1:]])
 
 
 def test_advice_is_for_searches_that_did_not_arrive():

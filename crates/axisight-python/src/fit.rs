@@ -1,132 +1,35 @@
-//! Fits.
+//! Fits to logs, which are made ready once and stay here.
 
 use crate::convert::rows;
 use crate::effects::{EffectTuple, settings};
-use crate::entry::{CancelToken, InputError, detached, flag, input_error};
+use crate::entry::{CancelToken, detached, flag, input_error};
 use crate::fit_results::{Column, Ended, FitResult, Linearization, problem_error};
+use crate::fit_specs::{
+    OptionSpec, ParameterSpec, WeightingTuple, loss, options, parameters, weightings,
+};
 use crate::robot::Robot;
 use crate::simulation::IntegratorSpec;
-use axisight_core::robot::{Parameter, RobotDescription};
+use axisight_core::simulation::Method;
 use axisight_identification::logs::{
-    Column as Shared, Courses as Runs, FitOptions, FitParameter, InverseDynamics,
-    Linearization as Point, Loss, MotionRecord, Problem, Record, SimulationErrorProblem,
-    SimulationInput, SimulationOutput, Target, fit,
+    Column as Shared, Courses as Runs, FitParameter, InverseDynamics, Linearization as Point,
+    MotionRecord, Problem, Record, SimulationErrorProblem, SimulationInput, SimulationOutput, fit,
 };
-use axisight_numerics::Weighting;
 use axisight_numerics::descent::Status;
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// One parameter to fit, as Python hands it over.
-#[derive(FromPyObject)]
-pub struct ParameterSpec {
-    /// Robot parameter name, or None for an effect parameter.
-    robot: Option<String>,
-    /// Position of the effect in the list, then of the parameter in its table.
-    effect: Option<(usize, usize)>,
-    initial: f64,
-    lower: f64,
-    upper: f64,
-    scale: f64,
-    prior: Option<(f64, f64)>,
-    frozen: bool,
-    nuisance: bool,
-    /// Of a shape: the only size of its effect, in the table of the effect.
-    amplitude: Option<usize>,
-}
-
-/// Settings of a fit, as Python hands them over.
-#[derive(FromPyObject)]
-pub struct OptionSpec {
-    max_iterations: usize,
-    loss_tolerance: f64,
-    step_tolerance: f64,
-    loss: String,
-    loss_scale: f64,
-    nuisance_refreshes: usize,
-    block_s: f64,
-    integrator: IntegratorSpec,
-}
-
-/// Frequencies [Hz], weights and decimation of one axis.
-type WeightingTuple = (Vec<f64>, Vec<f64>, usize);
 /// Number of a parameter and its Jacobian column.
 type WarmColumn<'py> = (usize, Bound<'py, Column>);
+/// A flag that ends a call early.
+type Cancel<'a, 'py> = Option<&'a Bound<'py, CancelToken>>;
 
 /// What to mind of every status that is no convergence: pairs of status and advice.
 #[pyfunction]
 pub fn status_advice() -> Vec<(&'static str, &'static str)> {
     let all = Status::ALL.iter();
     all.filter_map(|s| Some((s.name(), s.advice()?))).collect()
-}
-
-fn parameters(specs: &[ParameterSpec], robot: &RobotDescription) -> PyResult<Vec<FitParameter>> {
-    let size = |s: &ParameterSpec| {
-        let wanted = (s.effect?.0, s.amplitude?);
-        specs.iter().position(|other| other.effect == Some(wanted))
-    };
-    specs
-        .iter()
-        .enumerate()
-        .map(|(i, s)| {
-            let target = match (&s.robot, s.effect) {
-                (Some(name), None) => {
-                    Target::Robot(Parameter::parse(name, robot).map_err(input_error)?)
-                }
-                (None, Some((e, j))) => Target::Effect(e, j),
-                _ => {
-                    let text = "expected either a robot parameter or an effect parameter";
-                    return Err(InputError::new_err(format!("parameters[{i}]: {text}")));
-                }
-            };
-            Ok(FitParameter {
-                target,
-                initial: s.initial,
-                lower: s.lower,
-                upper: s.upper,
-                scale: s.scale,
-                prior: s.prior,
-                frozen: s.frozen,
-                amplitude: size(s),
-                nuisance: s.nuisance,
-            })
-        })
-        .collect()
-}
-
-fn loss(spec: &OptionSpec) -> PyResult<Loss> {
-    match spec.loss.as_str() {
-        "squared" => Ok(Loss::Squared),
-        "huber" => Ok(Loss::Huber(spec.loss_scale)),
-        "soft_l1" => Ok(Loss::SoftL1(spec.loss_scale)),
-        other => {
-            let text = format!("loss: expected squared, huber or soft_l1, got {other}");
-            Err(InputError::new_err(text))
-        }
-    }
-}
-
-fn options(spec: &OptionSpec) -> PyResult<FitOptions> {
-    Ok(FitOptions {
-        max_iterations: spec.max_iterations,
-        loss_tolerance: spec.loss_tolerance,
-        step_tolerance: spec.step_tolerance,
-        loss: loss(spec)?,
-        nuisance_refreshes: spec.nuisance_refreshes,
-    })
-}
-
-fn weightings(specs: Vec<WeightingTuple>) -> Vec<Weighting> {
-    specs
-        .into_iter()
-        .map(|(frequency_hz, weight, decimation)| Weighting {
-            frequency_hz,
-            weight,
-            decimation,
-        })
-        .collect()
 }
 
 fn warm_columns(warm: &[WarmColumn<'_>]) -> Vec<(usize, Shared)> {
@@ -137,12 +40,11 @@ fn warm_columns(warm: &[WarmColumn<'_>]) -> Vec<(usize, Shared)> {
 fn solve<P: Problem + Send>(
     py: Python<'_>,
     cancel: &AtomicBool,
-    problem: &P,
-    parameters: &[FitParameter],
-    options: FitOptions,
+    (problem, parameters): (&P, &[FitParameter]),
+    spec: &OptionSpec,
     warm: &[WarmColumn<'_>],
 ) -> PyResult<Ended<FitResult>> {
-    let warm = warm_columns(warm);
+    let (options, warm) = (options(spec)?, warm_columns(warm));
     let fit = detached(py, cancel, || fit(problem, parameters, options, &warm))?;
     Ended::of(fit.map(|fit| FitResult { fit }))
 }
@@ -150,12 +52,11 @@ fn solve<P: Problem + Send>(
 fn linearize<P: Problem + Send>(
     py: Python<'_>,
     cancel: &AtomicBool,
-    problem: &P,
-    parameters: &[FitParameter],
-    loss: Loss,
+    (problem, parameters): (&P, &[FitParameter]),
+    spec: &OptionSpec,
     warm: &[WarmColumn<'_>],
 ) -> PyResult<Ended<Linearization>> {
-    let warm = warm_columns(warm);
+    let (loss, warm) = (loss(spec)?, warm_columns(warm));
     let at = detached(py, cancel, || Point::new(problem, parameters, loss, &warm))?;
     Ended::of(at.map(|at| Linearization { at }))
 }
@@ -170,19 +71,6 @@ type RecordTuple<'py> = (
     usize,
 );
 
-/// What an error of simulation is made of, as Python hands it over.
-struct SimulationSpec<'a, 'py> {
-    robot: &'a Robot,
-    effects: Vec<EffectTuple>,
-    parameters: Vec<ParameterSpec>,
-    records: Vec<RecordTuple<'py>>,
-    weighting: Vec<WeightingTuple>,
-    options: &'a OptionSpec,
-    input: &'a str,
-    output: &'a str,
-    courses: Option<&'a Courses>,
-}
-
 /// Runs of a model over all logs, for models close to it.
 #[pyclass(frozen, module = "axisight._core")]
 pub struct Courses {
@@ -190,160 +78,164 @@ pub struct Courses {
     runs: Option<Arc<Runs>>,
 }
 
-impl SimulationSpec<'_, '_> {
-    fn problem(self, cancel: &Arc<AtomicBool>) -> PyResult<SimulationErrorProblem> {
-        let (robot, options) = (&self.robot.description, self.options);
-        let n_axes = robot.n_axes();
-        let record = |(i, t, c, start, lead): &RecordTuple<'_>| {
-            let certainty = c.as_ref().map(|c| rows(c, "certainty", n_axes));
-            Ok(Record {
-                input: rows(i, "input", n_axes)?,
-                target: rows(t, "target", n_axes)?,
-                certainty: certainty.transpose()?,
-                start: start.clone(),
-                lead: *lead,
-            })
-        };
-        let problem = SimulationErrorProblem {
-            robot: robot.clone(),
-            effects: settings(self.effects),
-            parameters: parameters(&self.parameters, robot)?,
-            records: self.records.iter().map(record).collect::<PyResult<_>>()?,
-            input: match self.input {
-                "reference" => SimulationInput::Reference,
-                "torque" => SimulationInput::Torque,
-                "tracking" => SimulationInput::Tracking,
-                other => {
-                    let text = "expected reference, torque or tracking";
-                    return Err(input_error(format!("input: {text}, got {other}")));
-                }
-            },
-            output: match self.output {
-                "torque" => SimulationOutput::Torque,
-                "position" => SimulationOutput::Position,
-                other => {
-                    let text = format!("output: expected torque or position, got {other}");
-                    return Err(input_error(text));
-                }
-            },
-            weighting: weightings(self.weighting),
-            method: options.integrator.method()?,
-            block_s: options.block_s,
-            courses: self.courses.and_then(|c| c.runs.clone()),
+/// Logs that a robot is simulated along, ready for fits of any effects.
+#[pyclass(frozen, module = "axisight._core")]
+pub struct SimulatedLogs {
+    /// Without effects and parameters.
+    bare: SimulationErrorProblem,
+}
+
+impl SimulatedLogs {
+    fn problem(
+        &self,
+        effects: Vec<EffectTuple>,
+        specs: &[ParameterSpec],
+        courses: Option<&Bound<'_, Courses>>,
+        cancel: &Arc<AtomicBool>,
+    ) -> PyResult<SimulationErrorProblem> {
+        Ok(SimulationErrorProblem {
+            effects: settings(effects),
+            parameters: parameters(specs, &self.bare.robot)?,
+            courses: courses.and_then(|c| c.get().runs.clone()),
             cancel: Some(Arc::clone(cancel)),
-        };
-        problem.validate().map_err(problem_error)?;
-        Ok(problem)
+            ..self.bare.clone()
+        })
     }
 }
 
-/// Fit the simulation of logs. `records` are (input, target, certainty or None) of `(n, n_axes)` arrays,
-/// where each starts, and its lead.
-#[pyfunction]
-#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, input="reference", output="torque", warm=Vec::new(), courses=None, cancel=None))]
-#[allow(clippy::too_many_arguments)] // keyword arguments of a binding
-pub fn fit_simulation(
-    py: Python<'_>,
-    robot: &Robot,
-    effects: Vec<EffectTuple>,
-    parameters: Vec<ParameterSpec>,
-    records: Vec<RecordTuple<'_>>,
-    weighting: Vec<WeightingTuple>,
-    options: OptionSpec,
-    input: &str,
-    output: &str,
-    warm: Vec<WarmColumn<'_>>,
-    courses: Option<&Bound<'_, Courses>>,
-    cancel: Option<&Bound<'_, CancelToken>>,
-) -> PyResult<Ended<FitResult>> {
-    let cancel = flag(cancel);
-    let spec = SimulationSpec {
-        robot,
-        effects,
-        parameters,
-        records,
-        weighting,
-        options: &options,
-        input,
-        output,
-        courses: courses.map(Bound::get),
-    };
-    let problem = spec.problem(&cancel)?;
-    let options = self::options(&options)?;
-    let parameters = &problem.parameters;
-    solve(py, &cancel, &problem, parameters, options, &warm)
+fn simulation_input(name: &str) -> PyResult<SimulationInput> {
+    match name {
+        "reference" => Ok(SimulationInput::Reference),
+        "torque" => Ok(SimulationInput::Torque),
+        "tracking" => Ok(SimulationInput::Tracking),
+        other => {
+            let text = "expected reference, torque or tracking";
+            Err(input_error(format!("input: {text}, got {other}")))
+        }
+    }
 }
 
-/// The simulation of logs at the initial values of the parameters.
-#[pyfunction]
-#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, input="reference", output="torque", warm=Vec::new(), courses=None, cancel=None))]
-#[allow(clippy::too_many_arguments)] // keyword arguments of a binding
-pub fn evaluate_simulation(
-    py: Python<'_>,
-    robot: &Robot,
-    effects: Vec<EffectTuple>,
-    parameters: Vec<ParameterSpec>,
-    records: Vec<RecordTuple<'_>>,
-    weighting: Vec<WeightingTuple>,
-    options: OptionSpec,
-    input: &str,
-    output: &str,
-    warm: Vec<WarmColumn<'_>>,
-    courses: Option<&Bound<'_, Courses>>,
-    cancel: Option<&Bound<'_, CancelToken>>,
-) -> PyResult<Ended<Linearization>> {
-    let cancel = flag(cancel);
-    let spec = SimulationSpec {
-        robot,
-        effects,
-        parameters,
-        records,
-        weighting,
-        options: &options,
-        input,
-        output,
-        courses: courses.map(Bound::get),
-    };
-    let problem = spec.problem(&cancel)?;
-    let loss = loss(&options)?;
-    let parameters = &problem.parameters;
-    linearize(py, &cancel, &problem, parameters, loss, &warm)
+fn simulation_output(name: &str) -> PyResult<SimulationOutput> {
+    match name {
+        "torque" => Ok(SimulationOutput::Torque),
+        "position" => Ok(SimulationOutput::Position),
+        other => {
+            let text = format!("output: expected torque or position, got {other}");
+            Err(input_error(text))
+        }
+    }
 }
 
-/// Runs of a model over all logs, along which the arm of models close to it may be linearised.
-#[pyfunction]
-#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, input="reference", output="torque", cancel=None))]
-#[allow(clippy::too_many_arguments)] // keyword arguments of a binding
-pub fn courses(
-    py: Python<'_>,
-    robot: &Robot,
-    effects: Vec<EffectTuple>,
-    parameters: Vec<ParameterSpec>,
-    records: Vec<RecordTuple<'_>>,
-    weighting: Vec<WeightingTuple>,
-    options: OptionSpec,
-    input: &str,
-    output: &str,
-    cancel: Option<&Bound<'_, CancelToken>>,
-) -> PyResult<Ended<Courses>> {
-    let cancel = flag(cancel);
-    let spec = SimulationSpec {
-        robot,
-        effects,
-        parameters,
-        records,
-        weighting,
-        options: &options,
-        input,
-        output,
-        courses: None,
-    };
-    let problem = spec.problem(&cancel)?;
-    let theta: Vec<f64> = problem.parameters.iter().map(|p| p.initial).collect();
-    let runs = detached(py, &cancel, || Runs::new(&problem, &theta))?;
-    Ended::of(runs.map(|runs| Courses {
-        runs: runs.map(Arc::new),
-    }))
+#[pymethods]
+impl SimulatedLogs {
+    #[new]
+    #[pyo3(signature = (robot, records, weighting, *, input="reference", output="torque", block_s=1.0, integrator=None))]
+    fn new(
+        robot: &Robot,
+        records: Vec<RecordTuple<'_>>,
+        weighting: Vec<WeightingTuple>,
+        input: &str,
+        output: &str,
+        block_s: f64,
+        integrator: Option<IntegratorSpec>,
+    ) -> PyResult<Self> {
+        let robot = robot.description.clone();
+        let n_axes = robot.n_axes();
+        let record = |(i, t, c, start, lead): RecordTuple<'_>| {
+            let certainty = c.map(|c| rows(&c, "certainty", n_axes));
+            Ok(Arc::new(Record {
+                input: rows(&i, "input", n_axes)?,
+                target: rows(&t, "target", n_axes)?,
+                certainty: certainty.transpose()?,
+                start,
+                lead,
+            }))
+        };
+        let each_sample = Method::RungeKutta4 { substeps: 1 };
+        let bare = SimulationErrorProblem {
+            effects: Vec::new(),
+            parameters: Vec::new(),
+            records: records.into_iter().map(record).collect::<PyResult<_>>()?,
+            input: simulation_input(input)?,
+            output: simulation_output(output)?,
+            weighting: weightings(weighting),
+            method: integrator.map_or(Ok(each_sample), |i| i.method())?,
+            block_s,
+            courses: None,
+            cancel: None,
+            robot,
+        };
+        bare.validate().map_err(problem_error)?;
+        Ok(Self { bare })
+    }
+
+    /// The same of some logs, by their numbers.
+    fn part(&self, logs: Vec<usize>) -> PyResult<Self> {
+        let bare = self.bare.part(&logs).map_err(problem_error)?;
+        Ok(Self { bare })
+    }
+
+    /// The same of the first `samples` of each log that are compared.
+    fn first(&self, samples: Vec<usize>) -> PyResult<Self> {
+        let bare = self.bare.first(&samples).map_err(problem_error)?;
+        Ok(Self { bare })
+    }
+
+    /// Fit the simulation.
+    #[pyo3(signature = (effects, parameters, options, *, warm=Vec::new(), courses=None, cancel=None))]
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
+    fn fit(
+        &self,
+        py: Python<'_>,
+        effects: Vec<EffectTuple>,
+        parameters: Vec<ParameterSpec>,
+        options: OptionSpec,
+        warm: Vec<WarmColumn<'_>>,
+        courses: Option<&Bound<'_, Courses>>,
+        cancel: Cancel<'_, '_>,
+    ) -> PyResult<Ended<FitResult>> {
+        let cancel = flag(cancel);
+        let problem = self.problem(effects, &parameters, courses, &cancel)?;
+        let parameters = &problem.parameters[..];
+        solve(py, &cancel, (&problem, parameters), &options, &warm)
+    }
+
+    /// The simulation at the initial values of the parameters.
+    #[pyo3(signature = (effects, parameters, options, *, warm=Vec::new(), courses=None, cancel=None))]
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
+    fn evaluate(
+        &self,
+        py: Python<'_>,
+        effects: Vec<EffectTuple>,
+        parameters: Vec<ParameterSpec>,
+        options: OptionSpec,
+        warm: Vec<WarmColumn<'_>>,
+        courses: Option<&Bound<'_, Courses>>,
+        cancel: Cancel<'_, '_>,
+    ) -> PyResult<Ended<Linearization>> {
+        let cancel = flag(cancel);
+        let problem = self.problem(effects, &parameters, courses, &cancel)?;
+        let parameters = &problem.parameters[..];
+        linearize(py, &cancel, (&problem, parameters), &options, &warm)
+    }
+
+    /// Runs of a model, along which the arm of models close to it may be linearised.
+    #[pyo3(signature = (effects, parameters, *, cancel=None))]
+    fn run(
+        &self,
+        py: Python<'_>,
+        effects: Vec<EffectTuple>,
+        parameters: Vec<ParameterSpec>,
+        cancel: Cancel<'_, '_>,
+    ) -> PyResult<Ended<Courses>> {
+        let cancel = flag(cancel);
+        let problem = self.problem(effects, &parameters, None, &cancel)?;
+        let theta: Vec<f64> = problem.parameters.iter().map(|p| p.initial).collect();
+        let runs = detached(py, &cancel, || Runs::new(&problem, &theta))?;
+        Ended::of(runs.map(|runs| Courses {
+            runs: runs.map(Arc::new),
+        }))
+    }
 }
 
 /// A motion as (position, velocity, acceleration, torque, certainty), each `(n, n_axes)`, motor side.
@@ -355,76 +247,105 @@ type MotionTuple<'py> = (
     PyReadonlyArray2<'py, f64>,
 );
 
-fn inverse_dynamics(
-    robot: &RobotDescription,
-    effects: Vec<EffectTuple>,
-    specs: Vec<ParameterSpec>,
-    records: &[MotionTuple<'_>],
-    weighting: Vec<WeightingTuple>,
-    block_s: f64,
-) -> PyResult<InverseDynamics> {
-    let n_axes = robot.n_axes();
-    let record = |(q, v, a, t, c): &MotionTuple<'_>| {
-        Ok(MotionRecord {
-            position: rows(q, "position", n_axes)?,
-            velocity: rows(v, "velocity", n_axes)?,
-            acceleration: rows(a, "acceleration", n_axes)?,
-            torque: rows(t, "torque", n_axes)?,
-            certainty: rows(c, "certainty", n_axes)?,
+/// Measured motions that a robot's torque is predicted from, ready for fits of any effects.
+#[pyclass(frozen, module = "axisight._core")]
+pub struct MeasuredMotions {
+    /// Without effects and parameters.
+    bare: InverseDynamics,
+}
+
+impl MeasuredMotions {
+    fn problem(
+        &self,
+        effects: Vec<EffectTuple>,
+        specs: &[ParameterSpec],
+    ) -> PyResult<InverseDynamics> {
+        Ok(InverseDynamics {
+            effects: settings(effects),
+            parameters: parameters(specs, &self.bare.robot)?,
+            ..self.bare.clone()
         })
-    };
-    let problem = InverseDynamics {
-        robot: robot.clone(),
-        effects: settings(effects),
-        parameters: parameters(&specs, robot)?,
-        records: records.iter().map(record).collect::<PyResult<_>>()?,
-        weighting: weightings(weighting),
-        block_s,
-    };
-    problem.validate().map_err(problem_error)?;
-    Ok(problem)
+    }
 }
 
-/// Fit the torque predicted from measured motions.
-#[pyfunction]
-#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, warm=Vec::new(), cancel=None))]
-#[allow(clippy::too_many_arguments)] // keyword arguments of a binding
-pub fn fit_inverse_dynamics(
-    py: Python<'_>,
-    robot: &Robot,
-    effects: Vec<EffectTuple>,
-    parameters: Vec<ParameterSpec>,
-    records: Vec<MotionTuple<'_>>,
-    weighting: Vec<WeightingTuple>,
-    options: OptionSpec,
-    warm: Vec<WarmColumn<'_>>,
-    cancel: Option<&Bound<'_, CancelToken>>,
-) -> PyResult<Ended<FitResult>> {
-    let (robot, block_s) = (&robot.description, options.block_s);
-    let problem = inverse_dynamics(robot, effects, parameters, &records, weighting, block_s)?;
-    let options = self::options(&options)?;
-    let parameters = &problem.parameters;
-    solve(py, &flag(cancel), &problem, parameters, options, &warm)
-}
+#[pymethods]
+impl MeasuredMotions {
+    #[new]
+    #[pyo3(signature = (robot, records, weighting, *, block_s=1.0))]
+    fn new(
+        robot: &Robot,
+        records: Vec<MotionTuple<'_>>,
+        weighting: Vec<WeightingTuple>,
+        block_s: f64,
+    ) -> PyResult<Self> {
+        let robot = robot.description.clone();
+        let n_axes = robot.n_axes();
+        let record = |(q, v, a, t, c): MotionTuple<'_>| {
+            Ok(Arc::new(MotionRecord {
+                position: rows(&q, "position", n_axes)?,
+                velocity: rows(&v, "velocity", n_axes)?,
+                acceleration: rows(&a, "acceleration", n_axes)?,
+                torque: rows(&t, "torque", n_axes)?,
+                certainty: rows(&c, "certainty", n_axes)?,
+            }))
+        };
+        let bare = InverseDynamics {
+            effects: Vec::new(),
+            parameters: Vec::new(),
+            records: records.into_iter().map(record).collect::<PyResult<_>>()?,
+            weighting: weightings(weighting),
+            block_s,
+            robot,
+        };
+        bare.validate().map_err(problem_error)?;
+        Ok(Self { bare })
+    }
 
-/// The torque predicted from measured motions at the initial values of the parameters.
-#[pyfunction]
-#[pyo3(signature = (robot, effects, parameters, records, weighting, options, *, warm=Vec::new(), cancel=None))]
-#[allow(clippy::too_many_arguments)] // keyword arguments of a binding
-pub fn evaluate_inverse_dynamics(
-    py: Python<'_>,
-    robot: &Robot,
-    effects: Vec<EffectTuple>,
-    parameters: Vec<ParameterSpec>,
-    records: Vec<MotionTuple<'_>>,
-    weighting: Vec<WeightingTuple>,
-    options: OptionSpec,
-    warm: Vec<WarmColumn<'_>>,
-    cancel: Option<&Bound<'_, CancelToken>>,
-) -> PyResult<Ended<Linearization>> {
-    let (robot, block_s) = (&robot.description, options.block_s);
-    let problem = inverse_dynamics(robot, effects, parameters, &records, weighting, block_s)?;
-    let loss = loss(&options)?;
-    let parameters = &problem.parameters;
-    linearize(py, &flag(cancel), &problem, parameters, loss, &warm)
+    /// The same of some motions, by their numbers.
+    fn part(&self, logs: Vec<usize>) -> PyResult<Self> {
+        let bare = self.bare.part(&logs).map_err(problem_error)?;
+        Ok(Self { bare })
+    }
+
+    /// The same motions with other factors on the errors of their samples.
+    fn with_certainty(&self, certainty: Vec<PyReadonlyArray2<'_, f64>>) -> PyResult<Self> {
+        let n_axes = self.bare.robot.n_axes();
+        let factors = certainty.iter().map(|c| rows(c, "certainty", n_axes));
+        let bare = self.bare.with_certainty(factors.collect::<PyResult<_>>()?);
+        Ok(Self {
+            bare: bare.map_err(problem_error)?,
+        })
+    }
+
+    /// Fit the predicted torque.
+    #[pyo3(signature = (effects, parameters, options, *, warm=Vec::new(), cancel=None))]
+    fn fit(
+        &self,
+        py: Python<'_>,
+        effects: Vec<EffectTuple>,
+        parameters: Vec<ParameterSpec>,
+        options: OptionSpec,
+        warm: Vec<WarmColumn<'_>>,
+        cancel: Cancel<'_, '_>,
+    ) -> PyResult<Ended<FitResult>> {
+        let problem = self.problem(effects, &parameters)?;
+        let parameters = &problem.parameters[..];
+        solve(py, &flag(cancel), (&problem, parameters), &options, &warm)
+    }
+
+    /// The predicted torque at the initial values of the parameters.
+    #[pyo3(signature = (effects, parameters, options, *, warm=Vec::new(), cancel=None))]
+    fn evaluate(
+        &self,
+        py: Python<'_>,
+        effects: Vec<EffectTuple>,
+        parameters: Vec<ParameterSpec>,
+        options: OptionSpec,
+        warm: Vec<WarmColumn<'_>>,
+        cancel: Cancel<'_, '_>,
+    ) -> PyResult<Ended<Linearization>> {
+        let problem = self.problem(effects, &parameters)?;
+        let parameters = &problem.parameters[..];
+        linearize(py, &flag(cancel), (&problem, parameters), &options, &warm)
+    }
 }

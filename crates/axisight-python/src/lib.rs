@@ -10,6 +10,7 @@ mod entry;
 mod excitation;
 mod fit;
 mod fit_results;
+mod fit_specs;
 mod frequency_fit;
 mod frf;
 mod local_models;
@@ -41,6 +42,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<entry::CancelToken>()?;
     module.add_class::<fit_results::Column>()?;
     module.add_class::<fit::Courses>()?;
+    module.add_class::<fit::SimulatedLogs>()?;
+    module.add_class::<fit::MeasuredMotions>()?;
     module.add_class::<fit_results::Diverged>()?;
     module.add_class::<fit_results::FitResult>()?;
     module.add_class::<fit_results::Linearization>()?;
@@ -50,11 +53,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulation::measurement_noise, module)?)?;
     module.add_function(wrap_pyfunction!(plant::state_at_rest, module)?)?;
     module.add_function(wrap_pyfunction!(plant::state_rates, module)?)?;
-    module.add_function(wrap_pyfunction!(fit::courses, module)?)?;
-    module.add_function(wrap_pyfunction!(fit::fit_simulation, module)?)?;
-    module.add_function(wrap_pyfunction!(fit::fit_inverse_dynamics, module)?)?;
-    module.add_function(wrap_pyfunction!(fit::evaluate_simulation, module)?)?;
-    module.add_function(wrap_pyfunction!(fit::evaluate_inverse_dynamics, module)?)?;
     module.add_function(wrap_pyfunction!(fit::status_advice, module)?)?;
     module.add_function(wrap_pyfunction!(excitation::random_phases, module)?)?;
     module.add_function(wrap_pyfunction!(excitation::multisine_peak, module)?)?;

@@ -278,16 +278,16 @@ def fit(
     chosen = options or FitOptions()
     added = list(effects)
     closed = is_closed_loop(robot, logs)
-    result = _core.fit_simulation(
+    ready = _core.SimulatedLogs(
         robot.core,
-        core_effects(added),
-        [core_spec(p, added) for p in parameters],
         records(logs, closed=closed),
         (weighting or Weighting.flat(robot.n_axes)).core(),
-        chosen,
         input="reference" if closed else "torque",
         output="torque" if closed else "position",
+        block_s=chosen.block_s,
+        integrator=chosen.integrator,
     )
+    result = ready.fit(core_effects(added), [core_spec(p, added) for p in parameters], chosen)
     if isinstance(result, Diverged):
         raise InputError(
             f"parameters: expected initial values that can be simulated, got some where {result}; "

@@ -102,14 +102,8 @@ class EffectTorques:
             every * command,
             np.ones_like(speeds),
         )
-        found = _core.evaluate_inverse_dynamics(
-            self._robot.core,
-            self._others,
-            [],
-            [record],
-            self._weighting,
-            self._options,
-        )
+        motion = _core.MeasuredMotions(self._robot.core, [record], self._weighting)
+        found = motion.evaluate(self._others, [], self._options)
         # Of motors that move such a load, less what it needs without effects.
         asked = must_hold(found).residual.reshape(self.n, -1).T + command
         return np.asarray(load - asked / self.ratio)

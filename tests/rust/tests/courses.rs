@@ -71,7 +71,7 @@ fn problem(input: SimulationInput) -> SimulationErrorProblem {
             SimulationInput::Tracking => run.measured,
             _ => reference,
         };
-        Record::new(input, run.command)
+        Arc::new(Record::new(input, run.command))
     };
     let records = LOGS.iter().map(record).collect();
     let mut problem = SimulationErrorProblem {
@@ -270,7 +270,7 @@ fn neither_threads_nor_company_change_a_run() {
 fn courses_that_end_too_early_are_refused() {
     let exact = problem(SimulationInput::Tracking);
     let mut shorter = exact.clone();
-    for record in &mut shorter.records {
+    for record in shorter.records.iter_mut().map(Arc::make_mut) {
         record.input.truncate(3 * 200);
         record.target.truncate(3 * 200);
     }
@@ -299,7 +299,7 @@ fn courses_that_do_not_serve_are_left_alone() {
     let rows = exact.records.iter().map(|r| r.input.len() / 3);
     let other = SimulationErrorProblem {
         records: rows
-            .map(|n| Record::new(vec![0.0; n], vec![0.0; n]))
+            .map(|n| Arc::new(Record::new(vec![0.0; n], vec![0.0; n])))
             .collect(),
         weighting: vec![flat(1.0)],
         parameters: Vec::new(),

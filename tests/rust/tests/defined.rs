@@ -5,6 +5,7 @@ use axisight_core::robot::{EffectSetting, RigidBody, RobotDescription};
 use axisight_core::simulation::{Drive, Method};
 use axisight_identification::logs::{InverseDynamics, MotionRecord, Problem};
 use axisight_tests::{PRESET, Random, effect, flat, plant, relative, robot, sines, trace};
+use std::sync::Arc;
 
 const METHOD: Method = Method::RungeKutta4 { substeps: 2 };
 
@@ -158,7 +159,7 @@ fn predicted_torques_of_coupled_axes_balance_power() {
         robot: robot.clone(),
         effects: vec![coupled],
         parameters: vec![],
-        records: vec![record.clone()],
+        records: vec![Arc::new(record.clone())],
         weighting: vec![flat(1.0); n],
         block_s: 1.0,
     };

@@ -8,6 +8,7 @@ use axisight_identification::logs::{
     SimulationErrorProblem, SimulationInput, SimulationOutput, Target, fit,
 };
 use axisight_tests::{ARM, effect, flat, free, robot, sines};
+use std::sync::Arc;
 
 const SAMPLES: usize = 200;
 
@@ -15,7 +16,7 @@ const SAMPLES: usize = 200;
 fn problem(effects: Vec<EffectSetting<f64>>, target: Target) -> SimulationErrorProblem {
     let robot = robot(ARM);
     let input = sines(SAMPLES, robot.n_axes(), robot.sample_time, 1.0);
-    let record = Record::new(input.clone(), vec![0.0; input.len()]);
+    let record = Arc::new(Record::new(input.clone(), vec![0.0; input.len()]));
     SimulationErrorProblem {
         records: vec![record; 2],
         robot,
@@ -110,13 +111,13 @@ fn predicted_torques_tell_them_apart() {
             robot: robot(ARM),
             effects,
             parameters: vec![free(Target::Robot(Parameter::Mass(0)), mass, 1.0)],
-            records: vec![MotionRecord {
+            records: vec![Arc::new(MotionRecord {
                 position: zeros.clone(),
                 velocity: zeros.clone(),
                 acceleration: zeros.clone(),
                 torque: zeros.clone(),
                 certainty: vec![1.0; SAMPLES],
-            }],
+            })],
             weighting: vec![flat(1.0)],
             block_s: 0.05,
         };

@@ -11,6 +11,7 @@ use axisight_tests::{
     ARM, PRESET, effect, flat, free, largest, plant, relative, robot, sines, trace,
 };
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 const SIGMA: f64 = 1e-3;
 const SAMPLES: usize = 800;
@@ -32,13 +33,13 @@ fn torque(robot: &RobotDescription, n: usize, size: f64) -> Vec<f64> {
 }
 
 /// Torque-driven logs of the arm with position noise `sigma`.
-fn logs(robot: &RobotDescription, seed: u64, sigma: f64) -> Vec<Record> {
+fn logs(robot: &RobotDescription, seed: u64, sigma: f64) -> Vec<Arc<Record>> {
     let plant = plant::<f64>(robot, &friction(TRUTH[3]));
     let log = |(run, size, n): (u64, f64, usize)| {
         let input = torque(robot, n, size);
         let noise = measurement_noise(seed, run, n, 1, sigma);
         let target = trace(&plant, robot, Drive::Torque(&[&input]), &[&noise], METHOD).measured;
-        Record::new(input, target)
+        Arc::new(Record::new(input, target))
     };
     [(0, 2.0, SAMPLES), (1, -1.5, SAMPLES - 100)]
         .map(log)
@@ -166,7 +167,7 @@ fn three_axes_come_back_from_reference_driven_torque() {
     });
     let problem = SimulationErrorProblem {
         parameters: parameters.collect(),
-        records: vec![Record::new(input, target)],
+        records: vec![Arc::new(Record::new(input, target))],
         robot,
         effects: Vec::new(),
         input: SimulationInput::Reference,
@@ -214,7 +215,7 @@ fn what_leads_to_a_log_is_simulated_and_not_compared() {
     let whole = arm_problem(3, SIGMA);
     let mut led = whole.clone();
     let lead = 150;
-    led.records[0].lead = lead;
+    Arc::make_mut(&mut led.records[0]).lead = lead;
     led.validate().expect("valid");
     let theta: Vec<f64> = whole.parameters.iter().map(|p| p.initial).collect();
     for columns in [&[0, 3][..], &[0, 1, 2, 3]] {
@@ -345,7 +346,7 @@ fn prior_pulls_as_hard_as_it_is_sharp() {
 #[test]
 fn robust_loss_resists_outliers() {
     let mut problem = arm_problem(8, SIGMA);
-    for record in &mut problem.records {
+    for record in problem.records.iter_mut().map(Arc::make_mut) {
         for (k, y) in record
             .target
             .iter_mut()
@@ -477,15 +478,16 @@ fn misuse_names_the_field() {
         "weighting"
     );
     let mut bad = good.clone();
-    bad.records[1].target[7] = f64::NAN;
+    Arc::make_mut(&mut bad.records[1]).target[7] = f64::NAN;
     assert_eq!(field(&bad), "records[1]");
-    bad.records[1].target.pop();
+    Arc::make_mut(&mut bad.records[1]).target.pop();
     assert_eq!(field(&bad), "records[1]");
     let mut bad = good.clone();
-    bad.records[0].lead = SAMPLES;
+    Arc::make_mut(&mut bad.records[0]).lead = SAMPLES;
     assert_eq!(field(&bad), "records[0].lead");
-    bad.records[0].lead = 10;
-    bad.records[0].certainty = Some(vec![1.0; SAMPLES]);
+    let first = Arc::make_mut(&mut bad.records[0]);
+    first.lead = 10;
+    first.certainty = Some(vec![1.0; SAMPLES]);
     assert_eq!(field(&bad), "records[0].certainty");
     let mut bad = good.clone();
     bad.parameters[2].scale = 0.0;
@@ -496,9 +498,7 @@ fn misuse_names_the_field() {
 #[test]
 fn cancelled_fit_stops() {
     let mut problem = arm_problem(1, SIGMA);
-    problem.cancel = Some(std::sync::Arc::new(std::sync::atomic::AtomicBool::new(
-        true,
-    )));
+    problem.cancel = Some(Arc::new(std::sync::atomic::AtomicBool::new(true)));
     let outcome = fit(&problem, &problem.parameters, FitOptions::default(), &[]);
     assert!(matches!(outcome, Err(ProblemError::Cancelled)));
 }

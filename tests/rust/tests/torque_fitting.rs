@@ -6,6 +6,7 @@ use axisight_identification::logs::{
     FitOptions, InverseDynamics, Linearization, Loss, MotionRecord, Target, fit,
 };
 use axisight_tests::{ARM, effect, flat, free, largest, robot};
+use std::sync::Arc;
 
 const SAMPLES: usize = 800;
 /// Dry friction of the machine.
@@ -64,8 +65,8 @@ fn inverse_dynamics_finds_mass_centre_and_friction() {
     for (noise, seed) in [(0.0, 1), (sigma, 2), (sigma, 3)] {
         let problem = InverseDynamics {
             records: vec![
-                motion(&robot, seed, noise),
-                motion(&robot, seed + 10, noise),
+                Arc::new(motion(&robot, seed, noise)),
+                Arc::new(motion(&robot, seed + 10, noise)),
             ],
             robot: robot.clone(),
             effects: friction(0.0),
@@ -103,7 +104,7 @@ fn uncertain_samples_count_for_less() {
         }
     }
     let mut problem = InverseDynamics {
-        records: vec![record],
+        records: vec![Arc::new(record)],
         robot: robot.clone(),
         effects: friction(COULOMB_NM),
         parameters: vec![free(Target::Robot(Parameter::Mass(0)), 40.0, 1.0)],
@@ -116,10 +117,8 @@ fn uncertain_samples_count_for_less() {
     problem.parameters[0].initial = 50.0;
     let start =
         Linearization::new(&problem, &problem.parameters, Loss::Squared, &[]).expect("model");
-    problem.records[0]
-        .certainty
-        .iter_mut()
-        .for_each(|c| *c *= 0.5);
+    let first = Arc::make_mut(&mut problem.records[0]);
+    first.certainty.iter_mut().for_each(|c| *c *= 0.5);
     let half =
         Linearization::new(&problem, &problem.parameters, Loss::Squared, &[]).expect("model");
     assert!((half.loss - 0.25 * start.loss).abs() < 1e-9 * start.loss);

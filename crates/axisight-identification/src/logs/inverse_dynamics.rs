@@ -7,7 +7,7 @@
 use super::gram::{Block, blocks};
 use super::lateness::commanded;
 use super::problem::{
-    Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, seeded,
+    Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, picked, seeded,
 };
 use axisight_core::effects::{CoupledAxis, Motor};
 use axisight_core::plant::{Axis, Plant, assemble};
@@ -15,6 +15,7 @@ use axisight_core::robot::{DynamicsScratch, EffectSetting, RobotDescription};
 use axisight_numerics::Weighting;
 use axisight_scalar::{Dual, Scalar};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Derivatives per pass.
 const SEEDS: usize = 8;
@@ -44,7 +45,7 @@ pub struct InverseDynamics {
     /// Parameters, in the order of `theta`.
     pub parameters: Vec<FitParameter>,
     /// The motions.
-    pub records: Vec<MotionRecord>,
+    pub records: Vec<Arc<MotionRecord>>,
     /// One weighting per axis.
     pub weighting: Vec<Weighting>,
     /// Length of a block [s].
@@ -87,6 +88,43 @@ impl InverseDynamics {
             }
         }
         Ok(())
+    }
+
+    /// The same of some motions, by their numbers.
+    ///
+    /// # Errors
+    /// [`ProblemError::Invalid`] for a motion that is not there.
+    pub fn part(&self, logs: &[usize]) -> Result<Self, ProblemError> {
+        let records = picked(&self.records, logs)?;
+        Ok(Self {
+            records,
+            ..self.clone()
+        })
+    }
+
+    /// The same motions with other factors on the errors of their samples.
+    ///
+    /// # Errors
+    /// [`ProblemError::Invalid`] for another number of motions, or factors that do not suit them.
+    pub fn with_certainty(&self, certainty: Vec<Vec<f64>>) -> Result<Self, ProblemError> {
+        if certainty.len() != self.records.len() {
+            let expected = format!("one array for each of {} motions", self.records.len());
+            let got = certainty.len().to_string();
+            return Err(invalid("certainty".into(), expected, got));
+        }
+        let records = self.records.iter().zip(certainty);
+        let weighed = |(record, certainty): (&Arc<MotionRecord>, Vec<f64>)| {
+            Arc::new(MotionRecord {
+                certainty,
+                ..MotionRecord::clone(record)
+            })
+        };
+        let found = Self {
+            records: records.map(weighed).collect(),
+            ..self.clone()
+        };
+        found.validate()?;
+        Ok(found)
     }
 
     /// Predicted torque of one record: `[quantity][axis][sample]`, value first.
@@ -313,7 +351,7 @@ impl Problem for InverseDynamics {
         if chunks.is_empty() {
             chunks.push(&[]);
         }
-        let tasks: Vec<(&MotionRecord, usize, &[usize])> = self
+        let tasks: Vec<(&Arc<MotionRecord>, usize, &[usize])> = self
             .records
             .iter()
             .flat_map(|r| chunks.iter().enumerate().map(move |(i, c)| (r, i, *c)))

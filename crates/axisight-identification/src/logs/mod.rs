@@ -10,6 +10,7 @@ mod linearize;
 mod loss;
 mod packing;
 mod problem;
+mod record;
 mod simulation_error;
 
 pub use courses::Courses;
@@ -20,4 +21,5 @@ pub use inverse_dynamics::{InverseDynamics, MotionRecord};
 pub use linearize::{Column, Linearization};
 pub use loss::Loss;
 pub use problem::{Evaluation, FitParameter, Problem, ProblemError, Target};
-pub use simulation_error::{Record, SimulationErrorProblem, SimulationInput, SimulationOutput};
+pub use record::Record;
+pub use simulation_error::{SimulationErrorProblem, SimulationInput, SimulationOutput};

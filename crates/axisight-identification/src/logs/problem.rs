@@ -6,6 +6,7 @@ use super::gram::Block;
 use axisight_core::robot::{EffectSetting, Parameter};
 use axisight_numerics::Weighting;
 use axisight_scalar::Scalar;
+use std::sync::Arc;
 
 /// What a fitted number is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -123,6 +124,22 @@ pub(super) fn check_logs(
             .map_err(|e| invalid(e.field.into(), e.expected.into(), e.got))?;
     }
     Ok(())
+}
+
+/// Some of the logs of a problem, by their numbers.
+pub(super) fn picked<T>(records: &[Arc<T>], logs: &[usize]) -> Result<Vec<Arc<T>>, ProblemError> {
+    let one = |i: &usize| {
+        let found = records.get(*i).map(Arc::clone);
+        found.ok_or_else(|| {
+            let expected = format!("numbers below {}", records.len());
+            invalid("logs".into(), expected, i.to_string())
+        })
+    };
+    if logs.is_empty() {
+        let expected = "at least one".into();
+        return Err(invalid("logs".into(), expected, "none".into()));
+    }
+    logs.iter().map(one).collect()
 }
 
 /// A nonlinear least-squares problem over logs.

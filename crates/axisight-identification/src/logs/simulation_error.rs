@@ -11,8 +11,9 @@ use super::courses::{Batch, Courses, OwnRun, Runs};
 use super::gram::{Block, blocks};
 use super::packing::{LANES, PARTIALS, Packing};
 use super::problem::{
-    Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, seeded,
+    Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, picked, seeded,
 };
+use super::record::Record;
 use axisight_core::plant::{Plant, assemble};
 use axisight_core::robot::{Course, EffectSetting, RobotDescription};
 use axisight_core::simulation::{Drive, Method, Run, Sample, Status, Stepper, simulate};
@@ -21,37 +22,6 @@ use axisight_scalar::{Dual, Lanes, Scalar};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-
-/// One log to be reproduced; arrays are row-major `(n_samples, n_axes)`.
-#[derive(Debug, Clone)]
-pub struct Record {
-    /// Velocity reference [rad/s], commanded torque [Nm] or, when tracking, measured
-    /// position [rad], as the problem's input asks.
-    pub input: Vec<f64>,
-    /// Commanded torque [Nm] or measured position [rad], as the problem's output asks.
-    pub target: Vec<f64>,
-    /// Factor on the weighted error of each sample, from 0 to 1: how far a model can be asked to
-    /// follow there. `None`: one everywhere.
-    pub certainty: Option<Vec<f64>>,
-    /// Driven joint angles where the run begins, at rest [rad]. `None`: the operating point.
-    pub start: Option<Vec<f64>>,
-    /// Samples at the beginning of input and target that are simulated and not compared: how a run
-    /// comes into the motion that its log begins with. `certainty` has none of them.
-    pub lead: usize,
-}
-
-impl Record {
-    /// A log that counts everywhere and begins at the operating point.
-    pub fn new(input: Vec<f64>, target: Vec<f64>) -> Self {
-        Self {
-            input,
-            target,
-            certainty: None,
-            start: None,
-            lead: 0,
-        }
-    }
-}
 
 /// What drives the simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,7 +54,7 @@ pub struct SimulationErrorProblem {
     /// Parameters, in the order of `theta`.
     pub parameters: Vec<FitParameter>,
     /// The logs.
-    pub records: Vec<Record>,
+    pub records: Vec<Arc<Record>>,
     /// Input of the simulation.
     pub input: SimulationInput,
     /// Output compared.
@@ -130,33 +100,42 @@ impl SimulationErrorProblem {
         let n_axes = self.robot.n_axes();
         check_logs(self.records.len(), &self.weighting, n_axes)?;
         for (i, record) in self.records.iter().enumerate() {
-            let (n, m) = (record.input.len(), record.target.len());
-            if n != m || n == 0 || n % n_axes != 0 {
-                let expected = format!("input and target of equal size, {n_axes} axes");
-                return Err(invalid(
-                    format!("records[{i}]"),
-                    expected,
-                    format!("{n} and {m} numbers"),
-                ));
-            }
-            if record.lead >= n / n_axes {
-                let expected = format!("less than {} samples", n / n_axes);
-                let field = format!("records[{i}].lead");
-                return Err(invalid(field, expected, record.lead.to_string()));
-            }
-            if let Some(certainty) = &record.certainty {
-                check_certainty(i, certainty, n - record.lead * n_axes)?;
-            }
-            if let Some(k) = record.target.iter().position(|v| !v.is_finite()) {
-                let got = format!("{} at sample {}", record.target[k], k / n_axes);
-                return Err(invalid(
-                    format!("records[{i}]"),
-                    "finite numbers".into(),
-                    got,
-                ));
-            }
+            record.validate(i, n_axes)?;
         }
         Ok(())
+    }
+
+    /// The same of some logs, by their numbers.
+    ///
+    /// # Errors
+    /// [`ProblemError::Invalid`] for a log that is not there.
+    pub fn part(&self, logs: &[usize]) -> Result<Self, ProblemError> {
+        let records = picked(&self.records, logs)?;
+        Ok(Self {
+            records,
+            ..self.clone()
+        })
+    }
+
+    /// The same of the first `samples` of each log that are compared.
+    ///
+    /// # Errors
+    /// [`ProblemError::Invalid`] for another number of logs, or more samples than one has.
+    pub fn first(&self, samples: &[usize]) -> Result<Self, ProblemError> {
+        let most: Vec<usize> = (0..self.records.len()).map(|i| self.n_samples(i)).collect();
+        let there = |(n, most): (&usize, &usize)| (1..=*most).contains(n);
+        if samples.len() != most.len() || !samples.iter().zip(&most).all(there) {
+            let expected = format!("from 1 to {most:?}, one a log");
+            return Err(invalid("samples".into(), expected, format!("{samples:?}")));
+        }
+        let n_axes = self.robot.n_axes();
+        let records = self.records.iter().zip(samples);
+        Ok(Self {
+            records: records
+                .map(|(r, n)| Arc::new(r.first(*n, n_axes)))
+                .collect(),
+            ..self.clone()
+        })
     }
 
     /// Samples of a log that are compared.
@@ -360,18 +339,6 @@ impl SimulationErrorProblem {
         }
         out
     }
-}
-
-fn check_certainty(record: usize, certainty: &[f64], n: usize) -> Result<(), ProblemError> {
-    let field = format!("records[{record}].certainty");
-    if certainty.len() != n {
-        let got = certainty.len().to_string();
-        return Err(invalid(field, format!("{n} numbers, as the input"), got));
-    }
-    if let Some(bad) = certainty.iter().find(|c| !(0.0..=1.0).contains(*c)) {
-        return Err(invalid(field, "from 0 to 1".into(), bad.to_string()));
-    }
-    Ok(())
 }
 
 /// One batch of logs as an evaluation goes through it.

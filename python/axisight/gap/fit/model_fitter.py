@@ -186,16 +186,16 @@ class ModelFitter(ABC):
         """
         held = [False] * len(model.free)
         setup = self._setup(model.free, model, robot_values, held, lazy=False)
-        return self.run(*self._for_core(setup), self._options())
+        return self.run(*self._for_core(setup))
 
     def _for_core(self, setup: _Setup) -> tuple[list[Effect], list[Parameter]]:
         return for_core(self.robot, setup.effects, setup.parameters)
 
     def run(
-        self, effects: Sequence[Effect], parameters: Sequence[Parameter], options: FitOptions
+        self, effects: Sequence[Effect], parameters: Sequence[Parameter]
     ) -> _core.Courses | Diverged | None:
         """Run the model in the core, at the initial values."""
-        del effects, parameters, options
+        del effects, parameters
         return None
 
     def fit(
@@ -313,7 +313,6 @@ class ModelFitter(ABC):
             loss_tolerance=tolerance,
             step_tolerance=1e-4,
             nuisance_refreshes=refreshes,
-            block_s=self.block_s,
         )
 
     def _setup(

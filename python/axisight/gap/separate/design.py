@@ -118,9 +118,8 @@ def _seen(
     together = [here] if here else []
     for place, (run, turn) in enumerate(zip(runs, turns, strict=True)):
         for group in [[k] for k in here] if alone else together:
-            fitter = view.fitter.along([run.records[k] for k in group])
-            if alone:
-                fitter.weighting = view.weighting_with(run.records[group[0]][1])
+            own = view.weighting_with(run.records[group[0]][1]) if alone else None
+            fitter = view.fitter.along([run.records[k] for k in group], own)
             left, samples = _left(fitter, turn.other, turn.free, n_axes)
             there = left
             if turn.neither != turn.free:

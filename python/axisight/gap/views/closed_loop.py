@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, EffectTuple, core_effects
+from axisight.effects import Effect, core_effects
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.divergence import Diverged
-from axisight.fitting.simulation_error import Spec, core_spec
+from axisight.fitting.simulation_error import core_spec
 from axisight.gap.controller.feedback import loop_responses, periodic_response
 from axisight.gap.controller.loop_decay import FORGOTTEN, slowest_decay_1_s
 from axisight.gap.controller.other_controllers import check_gains, other_controllers
@@ -51,14 +51,6 @@ TRACKING_SPEED = 1 / 3
 # Position [rad] and torque [Nm] of a log (lead + n, n_axes), its certainty (n, n_axes), the joint angles
 # where its run begins [rad], (n_axes,), None at the operating point, and how many samples lead to it.
 Record = tuple[Array, Array, Array, Array | None, int]
-# Robot, effects, parameters, records and weights, as the core takes them.
-Problem = tuple[
-    _core.Robot,
-    list[EffectTuple],
-    list[Spec],
-    list[Record],
-    list[tuple[list[float], list[float], int]],
-]
 
 
 class ClosedLoopView(View):
@@ -274,9 +266,22 @@ class ClosedLoopFitter(ModelFitter):
     ) -> None:
         super().__init__(robot, weighting, tolerances, block_s)
         self.records = records
+        self.simulated = self._made_ready()
+
+    def _made_ready(self) -> _core.SimulatedLogs:
+        """Return the records as the core keeps them."""
+        return _core.SimulatedLogs(
+            self.robot.core,
+            self.records,
+            self.weighting.core(),
+            input=self.driven_by,
+            output=self.compared,
+            block_s=self.block_s,
+        )
 
     def _keep(self, logs: Sequence[int]) -> None:
         self.records = [self.records[i] for i in logs]
+        self.simulated = self.simulated.part(logs)
 
     def counted(self) -> Array:
         """Return what every residual counts for (n_residuals,): the square of its certainty."""
@@ -290,10 +295,12 @@ class ClosedLoopFitter(ModelFitter):
         step = self.weighting.decimation
         return [c[: len(c) // step * step : step] ** 2 for _, _, c, _, _ in self.records]
 
-    def along(self, records: list[Record]) -> ClosedLoopFitter:
-        """Return the same for other runs, as ``records`` are."""
+    def along(self, records: list[Record], weighting: Weighting | None = None) -> Self:
+        """Return the same for other runs, as ``records`` are, and with other weights where given."""
         other = copy(self)
         other.records = records
+        other.weighting = self.weighting if weighting is None else weighting
+        other.simulated = other._made_ready()
         return other
 
     def beginnings(self) -> ModelFitter | None:
@@ -301,17 +308,13 @@ class ClosedLoopFitter(ModelFitter):
         halves = [len(c) // 2 for _, _, c, _, _ in self.records]
         if min(halves) < _LEAST_S / self.robot.sample_time_s:
             return None
-        return self.along(
-            [
-                (p[: lead + n], t[: lead + n], c[:n], start, lead)
-                for n, (p, t, c, start, lead) in zip(halves, self.records, strict=True)
-            ]
-        )
-
-    def _problem(self, effects: Sequence[Effect], parameters: Sequence[Parameter]) -> Problem:
-        """Return the problem as the core takes it."""
-        specs = [core_spec(p, effects) for p in parameters]
-        return self.robot.core, core_effects(effects), specs, self.records, self.weighting.core()
+        other = copy(self)
+        other.records = [
+            (p[: lead + n], t[: lead + n], c[:n], start, lead)
+            for n, (p, t, c, start, lead) in zip(halves, self.records, strict=True)
+        ]
+        other.simulated = self.simulated.first(halves)
+        return other
 
     def solve(
         self,
@@ -322,27 +325,17 @@ class ClosedLoopFitter(ModelFitter):
         near: _core.Courses | None = None,
     ) -> _core.FitResult | Diverged:
         """Run the fit in the core."""
-        return _core.fit_simulation(
-            *self._problem(effects, parameters),
-            options,
-            input=self.driven_by,
-            output=self.compared,
-            warm=warm,
-            courses=near,
-            cancel=self.cancel,
+        specs = [core_spec(p, effects) for p in parameters]
+        return self.simulated.fit(
+            core_effects(effects), specs, options, warm=warm, courses=near, cancel=self.cancel
         )
 
     def run(
-        self, effects: Sequence[Effect], parameters: Sequence[Parameter], options: FitOptions
+        self, effects: Sequence[Effect], parameters: Sequence[Parameter]
     ) -> _core.Courses | Diverged:
         """Run the model in the core."""
-        return _core.courses(
-            *self._problem(effects, parameters),
-            options,
-            input=self.driven_by,
-            output=self.compared,
-            cancel=self.cancel,
-        )
+        specs = [core_spec(p, effects) for p in parameters]
+        return self.simulated.run(core_effects(effects), specs, cancel=self.cancel)
 
     def linearize(
         self,
@@ -353,12 +346,7 @@ class ClosedLoopFitter(ModelFitter):
         near: _core.Courses | None = None,
     ) -> _core.Linearization | Diverged:
         """Evaluate the model in the core."""
-        return _core.evaluate_simulation(
-            *self._problem(effects, parameters),
-            options,
-            input=self.driven_by,
-            output=self.compared,
-            warm=warm,
-            courses=near,
-            cancel=self.cancel,
+        specs = [core_spec(p, effects) for p in parameters]
+        return self.simulated.evaluate(
+            core_effects(effects), specs, options, warm=warm, courses=near, cancel=self.cancel
         )

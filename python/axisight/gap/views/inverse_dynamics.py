@@ -271,21 +271,25 @@ class InverseDynamicsFitter(ModelFitter):
         block_s: float,
     ) -> None:
         super().__init__(robot, weighting, tolerances, block_s)
-        self.records = [(*m, c) for m, c in zip(motions, certainty, strict=True)]
+        self.certainty = list(certainty)
+        records = [(*m, c) for m, c in zip(motions, certainty, strict=True)]
+        self.motions = _core.MeasuredMotions(robot.core, records, weighting.core(), block_s=block_s)
 
     def _keep(self, logs: Sequence[int]) -> None:
-        self.records = [self.records[i] for i in logs]
+        self.certainty = [self.certainty[i] for i in logs]
+        self.motions = self.motions.part(logs)
 
     def tempered(self, factor: Array) -> ModelFitter:
         """Return the same with the errors of every axis times a factor (n_axes,)."""
         other = copy(self)
-        other.records = [(q, v, a, u, c * factor) for q, v, a, u, c in self.records]
+        other.certainty = [c * factor for c in self.certainty]
+        other.motions = self.motions.with_certainty(other.certainty)
         return other
 
     def counted(self) -> Array:
         """Return what every residual counts for (n_residuals,): the square of its certainty."""
         step = self.weighting.decimation
-        kept = (factor[: len(factor) // step * step : step] for *_, factor in self.records)
+        kept = (factor[: len(factor) // step * step : step] for factor in self.certainty)
         return np.concatenate([row for log in kept for row in log.T**2])
 
     def tolerated(self, effect: Effect) -> float:
@@ -315,15 +319,9 @@ class InverseDynamicsFitter(ModelFitter):
         _near: _core.Courses | None = None,
     ) -> _core.FitResult | Diverged:
         """Run the fit in the core."""
-        return _core.fit_inverse_dynamics(
-            self.robot.core,
-            core_effects(effects),
-            self._specs(parameters, effects),
-            self.records,
-            self.weighting.core(),
-            options,
-            warm=warm,
-            cancel=self.cancel,
+        specs = self._specs(parameters, effects)
+        return self.motions.fit(
+            core_effects(effects), specs, options, warm=warm, cancel=self.cancel
         )
 
     def linearize(
@@ -335,15 +333,9 @@ class InverseDynamicsFitter(ModelFitter):
         _near: _core.Courses | None = None,
     ) -> _core.Linearization | Diverged:
         """Evaluate the model in the core."""
-        return _core.evaluate_inverse_dynamics(
-            self.robot.core,
-            core_effects(effects),
-            self._specs(parameters, effects),
-            self.records,
-            self.weighting.core(),
-            options,
-            warm=warm,
-            cancel=self.cancel,
+        specs = self._specs(parameters, effects)
+        return self.motions.evaluate(
+            core_effects(effects), specs, options, warm=warm, cancel=self.cancel
         )
 
 

@@ -69,7 +69,7 @@ class TargetsView(View):
         for _ in range(_ROUNDS if fitter.gains else 0):
             # Gains say most of what a motion does between samples.
             self._like = Variant(must_hold(fitter.fit([])).robot_values)
-            fitter.records = _records(logs, self._between_samples(logs, settings))
+            fitter = fitter.along(_records(logs, self._between_samples(logs, settings)))
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
 
     def _between_samples(self, logs: Sequence[Log], settings: Settings) -> list[Array]:

@@ -148,9 +148,8 @@ def added_torque(tracking: Robot, log: Log) -> Array:
     """What the feedback that keeps a simulator on a log adds (n, n_axes) [Nm]."""
     record = log.led("position_rad"), log.led("torque_nm"), None, log.start_rad, log.lead
     flat = Weighting.flat(tracking.n_axes).core()
-    at = _core.evaluate_simulation(
-        tracking.core, [], [], [record], flat, FitOptions(), input="tracking", output="torque"
-    )
+    logs = _core.SimulatedLogs(tracking.core, [record], flat, input="tracking", output="torque")
+    at = logs.evaluate([], [], FitOptions())
     return at.residual.reshape(tracking.n_axes, -1).T
 
 

@@ -117,9 +117,8 @@ def test_residuals_are_those_of_a_robot_that_starts_there(robot: Robot) -> None:
     def residual(
         machine: Robot, which: list[tuple[Array, Array, None, Array | None, int]]
     ) -> Array:
-        at = _core.evaluate_simulation(
-            machine.core, core_effects([]), specs, which, flat, FitOptions(block_s=0.1)
-        )
+        logs = _core.SimulatedLogs(machine.core, which, flat, block_s=0.1)
+        at = logs.evaluate(core_effects([]), specs, FitOptions())
         return np.concatenate([at.residual, at.jacobian.ravel()])
 
     both = residual(robot, [(*r, pose, 0) for r, pose in zip(records, POSES, strict=False)])

@@ -1,0 +1,85 @@
+//! One log of a simulation-error problem.
+
+use super::problem::{ProblemError, invalid};
+
+/// One log to be reproduced; arrays are row-major `(n_samples, n_axes)`.
+#[derive(Debug, Clone)]
+pub struct Record {
+    /// Velocity reference [rad/s], commanded torque [Nm] or, when tracking, measured
+    /// position [rad], as the problem's input asks.
+    pub input: Vec<f64>,
+    /// Commanded torque [Nm] or measured position [rad], as the problem's output asks.
+    pub target: Vec<f64>,
+    /// Factor on the weighted error of each sample, from 0 to 1: how far a model can be asked to
+    /// follow there. `None`: one everywhere.
+    pub certainty: Option<Vec<f64>>,
+    /// Driven joint angles where the run begins, at rest [rad]. `None`: the operating point.
+    pub start: Option<Vec<f64>>,
+    /// Samples at the beginning of input and target that are simulated and not compared: how a run
+    /// comes into the motion that its log begins with. `certainty` has none of them.
+    pub lead: usize,
+}
+
+impl Record {
+    /// A log that counts everywhere and begins at the operating point.
+    pub fn new(input: Vec<f64>, target: Vec<f64>) -> Self {
+        Self {
+            input,
+            target,
+            certainty: None,
+            start: None,
+            lead: 0,
+        }
+    }
+
+    /// The first `n_samples` that are compared, and what leads to them, of `n_axes` axes.
+    pub(super) fn first(&self, n_samples: usize, n_axes: usize) -> Self {
+        let kept = (self.lead + n_samples) * n_axes;
+        let certainty = self.certainty.as_ref();
+        Self {
+            input: self.input[..kept.min(self.input.len())].to_vec(),
+            target: self.target[..kept.min(self.target.len())].to_vec(),
+            certainty: certainty.map(|c| c[..(n_samples * n_axes).min(c.len())].to_vec()),
+            start: self.start.clone(),
+            lead: self.lead,
+        }
+    }
+
+    /// Refuse arrays that do not suit `n_axes` axes; `number` is the log's among others.
+    pub(super) fn validate(&self, number: usize, n_axes: usize) -> Result<(), ProblemError> {
+        let field = format!("records[{number}]");
+        let (n, m) = (self.input.len(), self.target.len());
+        if n != m || n == 0 || n % n_axes != 0 {
+            let expected = format!("input and target of equal size, {n_axes} axes");
+            return Err(invalid(field, expected, format!("{n} and {m} numbers")));
+        }
+        if self.lead >= n / n_axes {
+            let expected = format!("less than {} samples", n / n_axes);
+            return Err(invalid(
+                format!("{field}.lead"),
+                expected,
+                self.lead.to_string(),
+            ));
+        }
+        if let Some(certainty) = &self.certainty {
+            let field = format!("{field}.certainty");
+            check_certainty(field, certainty, n - self.lead * n_axes)?;
+        }
+        if let Some(k) = self.target.iter().position(|v| !v.is_finite()) {
+            let got = format!("{} at sample {}", self.target[k], k / n_axes);
+            return Err(invalid(field, "finite numbers".into(), got));
+        }
+        Ok(())
+    }
+}
+
+fn check_certainty(field: String, certainty: &[f64], n: usize) -> Result<(), ProblemError> {
+    if certainty.len() != n {
+        let got = certainty.len().to_string();
+        return Err(invalid(field, format!("{n} numbers, as the input"), got));
+    }
+    if let Some(bad) = certainty.iter().find(|c| !(0.0..=1.0).contains(*c)) {
+        return Err(invalid(field, "from 0 to 1".into(), bad.to_string()));
+    }
+    Ok(())
+}
