@@ -29,7 +29,6 @@ TO_DO: set[str] = {
     "verdict/coarse_encoders.py",
     "verdict/headline.py",
     "verdict/unknown_torque_constants.py",
-    "views/inverse_dynamics.py",
 }
 
 

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.effects import Effect, core_effects
-from axisight.effects.stated import VISCOUS_FRICTION, WARMING
+from axisight.effects import Effect, core_effects, effect_info
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.divergence import Diverged
@@ -205,8 +204,8 @@ def _in_its_turn(effect: Effect, model: FittedModel) -> bool:
     is missing at all, for one that changes with time: that is asked where plain friction is a cause.
     """
     beside = {f.effect.name for f in model.free if f.effect.axis == effect.axis}
-    if effect.name == WARMING:
-        return VISCOUS_FRICTION in beside
+    if first := effect_info(effect.name).beside:
+        return beside.issuperset(first)
     return not (is_lag(effect) and beside)
 
 
