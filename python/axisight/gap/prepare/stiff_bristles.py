@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from axisight.effects import Effect
-from axisight.effects.stated import BRISTLES
+from axisight.effects import Effect, effect_info
 from axisight.gap.facts.faults import Finding
 from axisight.robot import Robot
 
@@ -14,13 +13,21 @@ def with_bristles_followed(robot: Robot) -> tuple[Robot, tuple[Finding, ...]]:
     With a relaxation of one step ``T`` the rate of the bristles is ``1 / T`` at most, of which Runge-Kutta steps
     of order four stand 2.8.
     """
-    name, _, relaxation = BRISTLES
     step = robot.sample_time_s
-    fast = [e for e in robot.effects if e.name == name and _value(e, relaxation) < step]
+    fast = {e: names for e in robot.effects if (names := _faster(e, step))}
     if not fast:
         return robot, ()
-    slowed = [e.with_values({relaxation: step}) if e in fast else e for e in robot.effects]
-    return robot.with_effects(slowed), tuple(_told(e, relaxation, step) for e in fast)
+    slowed = [
+        e.with_values(dict.fromkeys(fast[e], step)) if e in fast else e for e in robot.effects
+    ]
+    told = (_told(e, name, step) for e, names in fast.items() for name in names)
+    return robot.with_effects(slowed), tuple(told)
+
+
+def _faster(effect: Effect, step: float) -> list[str]:
+    """Return the parameters by which an effect changes faster than a step."""
+    times = effect_info(effect.name).marked("fastest_time")
+    return [name for name in times if _value(effect, name) < step]
 
 
 def _value(effect: Effect, parameter: str) -> float:
