@@ -19,7 +19,6 @@ ELSE = {
 }
 # Still to do.
 TO_DO: set[str] = {
-    "measure/detection_limits.py",
     "screening/restart_gear_law.py",
     "screening/restart_stiction.py",
     "screening/restart_uneven_friction.py",

@@ -14,7 +14,6 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
-from axisight.effects.stated import STIFFER
 from axisight.gap.facts.result import DetectionLimit, Hidden
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.held_out import held_out_loss
@@ -121,8 +120,7 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
         bounded = missing(at_most) > _PRECISION
         low = scipy.optimize.brentq(missing, low, at_most, xtol=_PRECISION) if bounded else at_most
     size = float(np.exp(low))
-    softens = (effect.name, s.parameter) == STIFFER
-    shown = _of_a_stiffer_gear(size) if softens else size
+    shown = _of_a_stiffer_gear(size) if "shows_inverse" in info.marks else size
     value = None if shown is None else max(shown, tolerated)
     why = _hides(s, size, shows) if value is None else None
     return DetectionLimit(
