@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import Effect
 from axisight.effects.stated import STEPS
 from axisight.logs import Log
 from axisight.logs.quality import quantization
@@ -33,3 +34,9 @@ def encoder_steps(robot: Robot, logs: Sequence[Log]) -> Array:
         if felt and alike and i + 1 not in known:
             out[i] = float(np.median(steps))
     return out
+
+
+def as_effect(axis: int, step_rad: float) -> Effect:
+    """Return the effect that steps of positions of an axis (from 0) are, with its size as its one parameter."""
+    name, increment = STEPS
+    return Effect(name, axis + 1, {increment: step_rad})

@@ -17,12 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
-from axisight.effects.stated import STEPS
 from axisight.gap.facts.named_cause import NamedCause
 from axisight.gap.facts.result import Interval
 from axisight.gap.facts.settings import Settings
 from axisight.gap.measure.gap_figures import Stage, Stages, gap_reduction
-from axisight.gap.signals.encoder_steps import OF_A_STEP
+from axisight.gap.signals.encoder_steps import OF_A_STEP, as_effect
 from axisight.gap.verdict.conclusion import Conclusion
 from axisight.gap.verdict.controller_causes import NO_SHARE, SAYS
 from axisight.gap.views.view import View
@@ -83,10 +82,12 @@ def _share(axis: int, stages: Stages, quiet: Stage, settings: Settings) -> Inter
 
 
 def _named(axis: int, step: float) -> NamedCause:
-    info = effect_info(STEPS[0])
+    effect = as_effect(axis, step)
+    info = effect_info(effect.name)
     value = Interval(step, step * (1 - OF_A_STEP), step * (1 + OF_A_STEP))
+    values = dict.fromkeys(effect.parameters or {}, value)
     units = {p.name: p.unit for p in info.parameters}
-    return NamedCause(info.name, axis + 1, _SURE, {STEPS[1]: value}, units, info.family, _SURE)
+    return NamedCause(info.name, effect.axis, _SURE, values, units, info.family, _SURE)
 
 
 _RAISES = (

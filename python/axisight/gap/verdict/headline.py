@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
-from axisight.effects import Effect, article, noun
-from axisight.effects.stated import STEPS
+from axisight.effects import Effect, article, effect_info, noun
 from axisight.gap.facts.axis_names import placed, removed_by_refit, with_joints
 from axisight.gap.facts.compared_quantity import gap_of, torque_of
 from axisight.gap.facts.result import Cause, Gap, Interval, Where
@@ -94,7 +93,7 @@ def _of_causes(
     missing = named(causes, own, len(gap.before_per_axis))
     # What logs show by themselves, and torques predicted from the motion do not feel.
     felt = [c for c in causes if not c.gap_reduction.low == c.gap_reduction.high == 0.0]
-    steps = [c for c in felt if c.effect == STEPS[0]]
+    steps = [c for c in felt if effect_info(c.effect).unrepeatable]
     if causes and not felt:
         return (
             f"The simulator lacks {missing}, which a torque predicted from the measured motion does not feel: "
