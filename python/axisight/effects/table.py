@@ -148,6 +148,11 @@ class EffectInfo:
         """Whether it is a law of the gear: a second one may mend the formula of the first."""
         return self.law_of == "gear"
 
+    @property
+    def torque_unit(self) -> bool:
+        """Whether it is another unit of torque: the command counts for more or less than stated."""
+        return "torque" in self.absorbed_by
+
     def marked(self, mark: Mark) -> tuple[str, ...]:
         """Return the names of the parameters with a mark."""
         return tuple(p.name for p in self.parameters if mark in p.marks)

@@ -24,7 +24,6 @@ TO_DO: set[str] = {
     "screening/restart_uneven_friction.py",
     "search/reported_torque.py",
     "search/stated_effects.py",
-    "verdict/unknown_torque_constants.py",
 }
 
 

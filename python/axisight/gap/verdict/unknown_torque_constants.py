@@ -5,19 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from axisight.effects import Effect
-from axisight.effects.stated import (
-    CONSTANT,
-    OF_ITS_AXIS,
-    OF_POSES,
-    ONE_FORMULA,
-    TORQUE_CONSTANT,
-)
+from axisight.effects import Effect, effect_info, effect_table
 from axisight.gap.facts.named_cause import NamedCause
 from axisight.gap.verdict.conclusion import Conclusion
 
-# Torques of gravity and inertia.
-_SCALED = ONE_FORMULA - {TORQUE_CONSTANT[0], CONSTANT[0]}
 _ADVICE = (
     "State the torque constants (scale in the column map, or torque_constant in the drive data): without them "
     "masses and constants do much the same."
@@ -44,12 +35,14 @@ def open_with_constants(conclusion: Conclusion, axes: Sequence[int]) -> Conclusi
 
 def _constants_like(cause: NamedCause, axes: Sequence[int]) -> tuple[str, ...]:
     """Return the labels of the constants, of ``axes``, whose torques a cause changes."""
-    if cause.effect not in _SCALED:
+    scales = effect_info(cause.effect).scales
+    if scales is None:
         return ()
     felt = list(axes)
-    if cause.axis is not None and cause.effect in OF_ITS_AXIS:
+    if cause.axis is not None and scales == "own":
         felt = [axis for axis in axes if axis == cause.axis]
-    elif cause.axis is not None and cause.effect not in OF_POSES:
+    elif cause.axis is not None and scales == "carriers":
         # A link weighs on what carries it.
         felt = [axis for axis in axes if axis <= cause.axis]
-    return tuple(Effect(TORQUE_CONSTANT[0], axis).label for axis in felt)
+    units = [info.name for info in effect_table().values() if info.torque_unit]
+    return tuple(Effect(name, axis).label for axis in felt for name in units)
