@@ -7,6 +7,7 @@ that share, and the machine a torque constant off by its inverse. Three numbers 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from axisight.effects import Effect, effect_info
 from axisight.effects.stated import OTHER_GAINS, TORQUE_CONSTANT, TORQUE_SENSOR
@@ -55,6 +56,37 @@ def share_reported(cause: AlgebraicCause) -> float | None:
         return None
     proportional, integral = (cause.values[name].value for name in OTHER_GAINS[1])
     return proportional if abs(proportional - integral) < _SAME_GAINS else None
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the controller's law asks for of the machine: an effect with its value.
+
+    ``share`` by which a drive reports its torque too large.
+    """
+
+    effect: Effect
+    share: float
+
+    def off(self, found: Effect) -> float:
+        """Return by what share the effect that a fit found is off the one asked for [1]."""
+        (error,) = found.values()
+        return abs((1 + error) * (1 + self.share) - 1)
+
+
+def asked_of_motion(shown: Sequence[AlgebraicCause]) -> dict[str, Asked]:
+    """Return what the machine's motion shows of torques that are reported wrong, by label.
+
+    A drive that reports a share of its torque: of a torque constant the inverse of that.
+    """
+    out = {}
+    for cause in shown:
+        share = share_reported(cause)
+        if share is not None:
+            value = 1 / (1 + share) - 1
+            effect = Effect(TORQUE_CONSTANT[0], cause.axis, {TORQUE_CONSTANT[1]: value})
+            out[effect.label] = Asked(effect, share)
+    return out
 
 
 def unseen_constant(settings: Settings) -> float:

@@ -10,10 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from axisight.effects import Effect
-from axisight.effects.stated import TORQUE_CONSTANT
 from axisight.fitting.divergence import must_hold
-from axisight.gap.controller.torque_sensor import share_reported
+from axisight.gap.controller.torque_sensor import Asked, asked_of_motion
 from axisight.gap.facts.algebraic_cause import AlgebraicCause
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.model_fitter import ModelFitter
@@ -38,11 +36,7 @@ def with_constants_told(
     ``shown``: what logs say of the controller by themselves. Where a cause of the axis, or of the arm,
     leaves such a constant as likely as itself, and a fit leaves no more with it; one that leads is surer.
     """
-    told = {
-        Effect(TORQUE_CONSTANT[0], cause.axis).label: share
-        for cause in shown
-        if (share := share_reported(cause)) is not None
-    }
+    told = asked_of_motion(shown)
     for cause, standing in found.accepted if told else ():
         rival = _told(standing, told)
         if rival is None:
@@ -60,28 +54,22 @@ def with_constants_told(
     return found
 
 
-def _told(standing: AxisPosterior, told: Mapping[str, float]) -> RankedHypothesis | None:
-    """Return the cause, or its rival, that is a torque constant the controller's share asks for."""
+def _told(standing: AxisPosterior, told: Mapping[str, Asked]) -> RankedHypothesis | None:
+    """Return the cause, or its rival, that is what the controller's share asks for."""
     for one in standing.inseparable():
-        share = told.get(one.trial.label)
-        if share is None:
-            continue
-        (error,) = one.trial.fitted.effects[-1].values()
-        if abs((1 + error) * (1 + share) - 1) < _OFF:
+        asked = told.get(one.trial.label)
+        if asked is not None and asked.off(one.trial.fitted.effects[-1]) < _OFF:
             return one
     return None
 
 
 def _held(
-    fitter: ModelFitter, model: FittedModel, label: str, told: Mapping[str, float]
+    fitter: ModelFitter, model: FittedModel, label: str, told: Mapping[str, Asked]
 ) -> FittedModel:
     """Return a model with its torque constant where the controller's share has it."""
-    value = 1 / (1 + told[label]) - 1
-    name = TORQUE_CONSTANT[1]
+    values = told[label].effect.parameters or {}
+    priors = {name: (value, _KNOWN) for name, value in values.items()}
     free = [
-        replace(f.at({name: value}), priors={name: (value, _KNOWN)})
-        if f.effect.label == label
-        else f
-        for f in model.free
+        replace(f.at(values), priors=priors) if f.effect.label == label else f for f in model.free
     ]
     return must_hold(fitter.fit(free, model, refreshes=1))
