@@ -22,7 +22,6 @@ TO_DO: set[str] = {
     "screening/restart_gear_law.py",
     "screening/restart_stiction.py",
     "screening/restart_uneven_friction.py",
-    "search/stated_effects.py",
 }
 
 

@@ -25,6 +25,9 @@ DEFAULT_TOLERANCES: Mapping[str, float] = MappingProxyType(
     }
 )
 
+KNOWN_AS = "viscous_friction"
+"""Quantity whose tolerance is that of effects that a simulator states itself, dry friction first."""
+
 
 @dataclass(frozen=True)
 class Settings:

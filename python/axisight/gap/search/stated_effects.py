@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import DRY_FRICTION, VISCOUS_FRICTION
 from axisight.gap.facts.faults import Finding
-from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.settings import KNOWN_AS, Settings
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.ranking.posterior import FORMULA_ERROR
 from axisight.gap.search.state import SearchState
@@ -19,8 +18,6 @@ from axisight.robot import Robot
 
 # Tolerances up to which a value is scatter, and those of what shapes a law, which logs tell less of.
 _SCATTER, _OF_SHAPES = 3.0, 10.0
-# The corner of a sign is how somebody writes it, not what a machine has.
-_CORNER = DRY_FRICTION[2]
 
 
 def with_scatter_taken(
@@ -31,7 +28,7 @@ def with_scatter_taken(
     Causes are that, or explain no more than one that is. And a finding for each; none where there is none. An
     effect is known as well as viscous friction is.
     """
-    tolerance = settings.tolerances_of(robot).get(VISCOUS_FRICTION, 0.0)
+    tolerance = settings.tolerances_of(robot).get(KNOWN_AS, 0.0)
     fitted = [*_rivals(found), *zip(found.model.free, found.model.effects, strict=False)]
     taken = {e.label: (f, e) for f, e in fitted if _is_scatter(f, e, tolerance)}
     if not taken:
@@ -63,7 +60,7 @@ def _is_scatter(option: Hypothesis, fitted: Effect, tolerance: float) -> bool:
             else _OF_SHAPES * tolerance * (abs(option.stated[p.name]) or 1.0)
         )
         for p in table
-        if p.name in option.free and p.name != _CORNER
+        if p.name in option.free and "notation" not in p.marks
     )
 
 
@@ -85,7 +82,7 @@ def _told(option: Hypothesis, fitted: Effect, tolerance: float) -> Finding:
     )
     message = (
         f"{fitted.label}: {off} off what the simulator states. Within {100 * _SCATTER * tolerance:g} %, three of "
-        f"the tolerance of {VISCOUS_FRICTION}, that is scatter of machines and no cause: the gap is counted with it."
+        f"the tolerance of {KNOWN_AS}, that is scatter of machines and no cause: the gap is counted with it."
     )
     return Finding("effect_within_scatter", "flag", message, axis=fitted.axis, field=fitted.name)
 
