@@ -21,7 +21,6 @@ ELSE = {
 TO_DO: set[str] = {
     "screening/restart_gear_law.py",
     "screening/restart_stiction.py",
-    "screening/restart_uneven_friction.py",
 }
 
 

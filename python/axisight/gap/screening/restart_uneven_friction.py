@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from axisight.effects import Effect
-from axisight.effects.stated import BEHIND_GEAR, DRY_FRICTION, UNEVEN
+from axisight.effects import Effect, effect_table
+from axisight.effects.kin import BegunFrom
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.ranking.posterior import AxisPosterior, FittedHypothesis
 
@@ -24,27 +24,26 @@ def begun_wider(
 ) -> list[tuple[FittedModel, Hypothesis]]:
     """Return uneven friction for axes that even friction leads on, each with the model it takes the place in.
 
-    ``offered``: candidates for what is left of a model.
+    And whatever else begins from the law that leads. ``offered``: candidates for what is left of a model.
     """
     known = {t.label: t for t in trials}
+    wider = [(info.name, info.begun_from) for info in effect_table().values() if info.begun_from]
     out: list[tuple[FittedModel, Hypothesis]] = []
     for standing in standings:
         even = standing.best.trial
         effect = even.fitted.effects[-1]
-        mine = effect.name == DRY_FRICTION[0] and effect.axis == standing.axis + 1
-        if not mine or standing.best.score > 1 - _LEAVES:
+        if effect.axis != standing.axis + 1 or standing.best.score > 1 - _LEAVES:
             continue
-        label = Effect(UNEVEN[0], effect.axis).label
-        if label in known and known[label].fitted.total <= even.fitted.total:
-            continue
-        options = (o for o in offered(even.fitted) if o.effect.label == label)
-        out += [(even.fitted, option.at(_as_even(effect))) for option in options]
+        for name, begun in wider:
+            label = Effect(name, effect.axis).label
+            tried = label in known and known[label].fitted.total <= even.fitted.total
+            if effect.name == begun.law and not tried:
+                options = (o for o in offered(even.fitted) if o.effect.label == label)
+                out += [(even.fitted, option.at(_as_even(effect, begun))) for option in options]
     return out
 
 
-def _as_even(even: Effect) -> dict[str, float]:
+def _as_even(even: Effect, begun: BegunFrom) -> dict[str, float]:
     """Return what uneven friction takes over from one that is the same everywhere."""
     values = even.parameters or {}
-    _, size, corner = DRY_FRICTION
-    side = {BEHIND_GEAR: values[BEHIND_GEAR]} if BEHIND_GEAR in values else {}
-    return {UNEVEN[1]: values[size], corner: values[corner], **side}
+    return {taken: values[name] for name, taken in begun.takes.items() if name in values}
