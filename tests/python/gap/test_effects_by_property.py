@@ -20,7 +20,6 @@ ELSE = {
 # Still to do.
 TO_DO: set[str] = {
     "screening/restart_gear_law.py",
-    "screening/restart_stiction.py",
 }
 
 

@@ -9,17 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from axisight.effects import Effect, effect_info
-from axisight.effects.stated import BRISTLES, STRIBECK
+from axisight.effects import Effect, effect_info, effect_table
+from axisight.effects.kin import Later
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 
 # Share of the explainable error that bristles have to leave for how they break away to be looked for in it.
 _LEAVES = 0.003
-# By how much more they hold, to begin with, and at most.
-_HOLDS = 1.3
-_MOST = 5.0
-_RATIO = "static_ratio"
 
 
 def begun_sticking(
@@ -27,47 +23,58 @@ def begun_sticking(
 ) -> list[tuple[FittedModel, Hypothesis]]:
     """Return bristles that stick for axes that friction leads on, each with those it takes the place of.
 
-    ``options``: all candidates; over which speeds Stribeck friction is looked for they are, too.
+    And whatever else has numbers that are looked for later. ``options``: all candidates; over which speeds
+    Stribeck friction is looked for they are, too.
     """
-    speed = STRIBECK[3]
+    sticking = [(info.name, info.later) for info in effect_table().values() if info.later]
     begun: list[tuple[FittedModel, Hypothesis]] = []
     for standing in standings:
-        axis = standing.axis + 1
-        bristles = _bristles(standing)
-        falling = _named(options, Effect(STRIBECK[0], axis).label)
-        if bristles is None or falling is None:
-            continue
-        fitted, yielding = bristles.trial.fitted, bristles.trial.hypothesis
-        first = float((falling.effect.parameters or {})[speed])
-        for over in sorted({first, *(s.get(speed, first) for s in falling.starts)}):
-            option = replace(
-                yielding,
-                effect=fitted.effects[-1].with_values({_RATIO: _HOLDS, speed: over}),
-                free=(*yielding.free, _RATIO, speed),
-                bounds={
-                    **yielding.bounds,
-                    _RATIO: (1.0, _MOST),
-                    speed: falling.bounds[speed],
-                },
-                starts=(),
-            )
-            begun.append((fitted, option))
+        for name, later in sticking:
+            yielding = _yielding(standing, name, later)
+            falling = _named(options, Effect(later.as_of, standing.axis + 1).label)
+            if yielding is not None and falling is not None:
+                fitted = yielding.trial.fitted
+                of_law = _sticking(yielding.trial.hypothesis, fitted.effects[-1], later, falling)
+                begun += [(fitted, option) for option in of_law]
     return begun
 
 
-def _bristles(standing: AxisPosterior) -> RankedHypothesis | None:
-    """Return bristles of an axis that friction of its own leads on, which do not stick and leave something."""
-    label = Effect(BRISTLES[0], standing.axis + 1).label
+def _sticking(
+    yielding: Hypothesis, fitted: Effect, later: Later, falling: Hypothesis
+) -> list[Hypothesis]:
+    """Return a law with its later numbers free, begun at each shape at which a like one is."""
+    ratio, speed = later.amplitude, later.shape
+    least = next(p.neutral for p in effect_info(fitted.name).parameters if p.name == ratio)
+    first = float((falling.effect.parameters or {})[speed])
+    return [
+        replace(
+            yielding,
+            effect=fitted.with_values({ratio: later.begin, speed: over}),
+            free=(*yielding.free, ratio, speed),
+            bounds={
+                **yielding.bounds,
+                ratio: (least, later.most),
+                speed: falling.bounds[speed],
+            },
+            starts=(),
+        )
+        for over in sorted({first, *(s.get(speed, first) for s in falling.starts)})
+    ]
+
+
+def _yielding(standing: AxisPosterior, name: str, later: Later) -> RankedHypothesis | None:
+    """Return a law of an axis that a law of its family leads on, without its later numbers, which leaves something."""
+    label = Effect(name, standing.axis + 1).label
     leader = standing.best.trial.hypothesis.effect
-    leads = effect_info(leader.name).family == "friction" and leader.axis == standing.axis + 1
-    if not leads:
+    alike = effect_info(leader.name).family == effect_info(name).family
+    if not alike or leader.axis != standing.axis + 1:
         return None
     return next(
         (
             r
             for r in standing.ranked
             if r.trial.label == label
-            and _RATIO not in r.trial.hypothesis.free
+            and later.amplitude not in r.trial.hypothesis.free
             and r.score < 1 - _LEAVES
         ),
         None,
