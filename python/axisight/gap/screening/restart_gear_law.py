@@ -15,7 +15,6 @@ from scipy.optimize import least_squares
 
 from axisight.effects import Effect, effect_info
 from axisight.effects.gear_curves import CURVES, Curve
-from axisight.effects.stated import PLAY
 from axisight.fitting import robot_parameters
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.ranking.posterior import AxisPosterior, FittedHypothesis, RankedHypothesis
@@ -97,9 +96,9 @@ def others_of_its_gear(
     near = _NEAR * best.score
     done = {r.trial.label for r in standing.ranked if r.score >= near and _in_place(r.trial)}
     stiffness = fitted.robot_values.get(name, robot_parameters(robot)[name])
-    if leader.name == PLAY[0]:
+    if _held_first(leader.name):
         if not _in_place(best.trial):
-            options = [o for o in options if o.effect.name == PLAY[0]]
+            options = [o for o in options if o.effect.name == leader.name]
         elif best.score >= _NEAR:
             return []
     begun = (
@@ -116,23 +115,29 @@ def others_of_its_gear(
 
 def _in_place(one: FittedHypothesis) -> bool:
     """Whether a fit of a law has sensitivities of its own, and all its numbers."""
-    option = one.hypothesis
-    return one.fitted.renewed and (option.effect.name != PLAY[0] or _damps(option))
+    return one.fitted.renewed and not _still_held(one.hypothesis)
 
 
-def _damps(option: Hypothesis) -> bool:
-    return PLAY[1] in option.free
+def _held_first(name: str) -> tuple[str, ...]:
+    """Return the parameters of a law that first fits hold: of play what is damped in its gap."""
+    return effect_info(name).marked("held_first")
+
+
+def _still_held(option: Hypothesis) -> list[str]:
+    """Return those of them that are not free."""
+    return [name for name in _held_first(option.effect.name) if name not in option.free]
 
 
 def _damped_too(option: Hypothesis, leader: Effect) -> Hypothesis:
     """Return play with what is damped in the gap free too, begun as the leader has it; other laws as they are."""
-    if option.effect.name != PLAY[0] or _damps(option):
+    held = _still_held(option)
+    if not held:
         return option
     # Laws without a gap damp everywhere.
-    begin = 1.0
-    if leader.name == PLAY[0]:
-        begin = (leader.parameters or {}).get(PLAY[1]) or _HALF
-    return replace(option.at({PLAY[1]: begin}), free=(*option.free, PLAY[1]))
+    begin = dict.fromkeys(held, 1.0)
+    if leader.name == option.effect.name:
+        begin = {name: (leader.parameters or {}).get(name) or _HALF for name in held}
+    return replace(option.at(begin), free=(*option.free, *held))
 
 
 def on_the_curve(
@@ -161,7 +166,7 @@ def on_the_curve(
 
     wanted = turned(other, _named(leader))
     # What is damped no curve shows.
-    free = [name for name in option.free if name != PLAY[1]]
+    free = [name for name in option.free if name not in _held_first(option.effect.name)]
     low, high = np.transpose([(1 - _OTHERS, 1 + _OTHERS), *(option.limits(n) for n in free)])
     scale = np.array([1.0, *_typical(option.effect, free)])
     values = _named(option.effect)
