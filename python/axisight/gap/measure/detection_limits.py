@@ -18,7 +18,8 @@ from axisight.gap.facts.result import DetectionLimit, Hidden
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.sensitivity import Sensitivity
-from axisight.gap.ranking.posterior import numbers, smallest_likely_fall
+from axisight.gap.ranking.fitted_hypothesis import numbers
+from axisight.gap.ranking.likelihood import smallest_likely_fall
 from axisight.gap.screening.screening import ScreeningModel, thinned
 from axisight.gap.search.state import SearchState
 from axisight.gap.views.view import View

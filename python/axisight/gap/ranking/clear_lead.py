@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from axisight.gap.fit.held_out import linear_gain
 from axisight.gap.fit.settling import SETTLED
-from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis, are_lags
+from axisight.gap.ranking.fitted_hypothesis import are_lags
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 
 CLOSE = 0.6
 """Share of the first one's score that a rival needs to be refined: a fit of its own does not make more of the rest."""

@@ -13,7 +13,8 @@ from axisight.effects.kin import Resembles
 from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.model_fitter import ModelFitter
-from axisight.gap.ranking.posterior import AxisPosterior, FittedHypothesis
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
+from axisight.gap.ranking.posterior import AxisPosterior
 
 # Of what the leader of an axis explains, which a lag may explain less and still end at as much.
 _NEAR = 0.03

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
-from axisight.gap.ranking.posterior import FittedHypothesis, trial
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, trial
 from axisight.gap.screening.screening import Screening, ScreeningModel, Start
 
 # Steps of the fit of a candidate; leaders go on from there.

@@ -17,7 +17,8 @@ from axisight.effects import Effect, effect_info
 from axisight.effects.gear_curves import CURVES, Curve
 from axisight.fitting import robot_parameters
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
-from axisight.gap.ranking.posterior import AxisPosterior, FittedHypothesis, RankedHypothesis
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.screening.restart_look_alike import in_common
 from axisight.robot import Robot
 

@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from axisight.effects import Effect, EffectInfo, effect_info
 from axisight.gap.fit.fitted_model import Hypothesis
-from axisight.gap.ranking.posterior import FittedHypothesis
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.screening.screening import Start
 
 

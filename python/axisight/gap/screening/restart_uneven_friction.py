@@ -11,7 +11,8 @@ from collections.abc import Callable, Sequence
 from axisight.effects import Effect, effect_table
 from axisight.effects.kin import BegunFrom
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
-from axisight.gap.ranking.posterior import AxisPosterior, FittedHypothesis
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
+from axisight.gap.ranking.posterior import AxisPosterior
 
 # Share of the explainable error that even friction has to leave for another law to be looked for in it.
 _LEAVES = 0.01

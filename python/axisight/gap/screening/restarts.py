@@ -17,7 +17,8 @@ from axisight.gap.fit.held_out import linear_gain
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.settling import RENEWALS, settled
 from axisight.gap.ranking.drive_lags import ended, lags_beside
-from axisight.gap.ranking.posterior import AxisPosterior, FittedHypothesis, trial
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, trial
+from axisight.gap.ranking.posterior import AxisPosterior
 from axisight.gap.screening.restart_gear_law import begun_on_curves
 from axisight.gap.screening.restart_stiction import begun_sticking
 from axisight.gap.screening.restart_uneven_friction import begun_wider

@@ -22,15 +22,9 @@ from axisight.gap.fit.sensitivity import Sensitivity
 from axisight.gap.fit.settling import has_settled, settled
 from axisight.gap.fit.tolerance_edges import BENT, bent
 from axisight.gap.ranking.clear_lead import CLOSE, clear
-from axisight.gap.ranking.posterior import (
-    AxisPosterior,
-    FittedHypothesis,
-    as_good_with_less,
-    falls,
-    of_one_formula,
-    stand,
-    trial,
-)
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, falls, trial
+from axisight.gap.ranking.judgement import stand
+from axisight.gap.ranking.posterior import AxisPosterior, as_good_with_less, of_one_formula
 from axisight.gap.screening.column_cache import ColumnCache
 from axisight.gap.screening.partial_fit import TrialFit
 from axisight.gap.screening.promise import HOPELESS, best_by_axis, least_of_the_arm, promising

@@ -21,16 +21,10 @@ from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.settling import settled
-from axisight.gap.ranking.posterior import (
-    AxisPosterior,
-    FittedHypothesis,
-    RankedHypothesis,
-    clearly_worse,
-    likelier,
-    numbers,
-    stand,
-    trial,
-)
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, numbers, trial
+from axisight.gap.ranking.judgement import stand
+from axisight.gap.ranking.likelihood import clearly_worse, likelier
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 
 Array = NDArray[np.float64]
 

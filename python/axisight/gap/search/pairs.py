@@ -21,14 +21,10 @@ from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.ranking.drive_lags import is_lag
-from axisight.gap.ranking.posterior import (
-    AxisPosterior,
-    FittedHypothesis,
-    RankedHypothesis,
-    clearly_worse,
-    stand,
-    trial,
-)
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, trial
+from axisight.gap.ranking.judgement import stand
+from axisight.gap.ranking.likelihood import clearly_worse
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.screening.restart_look_alike import ended_at_bound
 from axisight.statistics.tails import normal_deviate
 

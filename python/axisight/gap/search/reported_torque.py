@@ -15,7 +15,8 @@ from axisight.gap.controller.torque_sensor import Asked, asked_of_motion
 from axisight.gap.facts.algebraic_cause import AlgebraicCause
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.model_fitter import ModelFitter
-from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis, clearly_worse
+from axisight.gap.ranking.likelihood import clearly_worse
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.search.state import Round, SearchState
 from axisight.gap.search.swap import in_its_place
 

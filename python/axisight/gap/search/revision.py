@@ -14,7 +14,9 @@ from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import held_out_loss, linear_gain
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.settling import settled
-from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis, stand, trial
+from axisight.gap.ranking.fitted_hypothesis import trial
+from axisight.gap.ranking.judgement import stand
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.search.one_for_several import one_for_several
 from axisight.gap.search.state import OPEN, Round, SearchState
 from axisight.gap.search.swap import (

@@ -16,14 +16,9 @@ from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.settling import settled
-from axisight.gap.ranking.posterior import (
-    FORMULA_ERROR,
-    AxisPosterior,
-    FittedHypothesis,
-    RankedHypothesis,
-    clearly_worse,
-    falls,
-)
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, falls
+from axisight.gap.ranking.likelihood import FORMULA_ERROR, clearly_worse
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.screening.column_cache import ColumnCache
 from axisight.gap.screening.promise import HOPELESS
 from axisight.gap.screening.screening import kept_beside

@@ -13,12 +13,9 @@ from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.held_out import held_out_loss, predictable
 from axisight.gap.fit.sensitivity import Sensitivity
-from axisight.gap.ranking.posterior import (
-    FORMULA_ERROR,
-    AxisPosterior,
-    FittedHypothesis,
-    RankedHypothesis,
-)
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
+from axisight.gap.ranking.likelihood import FORMULA_ERROR
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.search.swap import alike
 
 Array = NDArray[np.float64]

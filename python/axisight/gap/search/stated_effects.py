@@ -12,7 +12,7 @@ from axisight.effects import Effect, effect_info
 from axisight.gap.facts.faults import Finding
 from axisight.gap.facts.settings import KNOWN_AS, Settings
 from axisight.gap.fit.fitted_model import Hypothesis
-from axisight.gap.ranking.posterior import FORMULA_ERROR
+from axisight.gap.ranking.likelihood import FORMULA_ERROR
 from axisight.gap.search.state import SearchState
 from axisight.robot import Robot
 

@@ -21,7 +21,9 @@ from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.settling import settled
 from axisight.gap.fit.tolerance_edges import BENT, bent
-from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis, stand, trial
+from axisight.gap.ranking.fitted_hypothesis import trial
+from axisight.gap.ranking.judgement import stand
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.screening.screening import kept_beside
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from axisight.gap.facts.experiment import ENOUGH, NAMED, Plan, SeparatingExperiment
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.fitted_model import FittedModel
-from axisight.gap.ranking.posterior import log_ratio
+from axisight.gap.ranking.likelihood import log_ratio
 from axisight.gap.search.state import SearchState
 from axisight.gap.separate.question import Seen, Turn
 

@@ -13,7 +13,7 @@ from axisight.gap.facts.experiment import NAMED, Plan, ShowingExperiment
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.measure.detection_limits import loss_that_shows
-from axisight.gap.ranking.posterior import numbers
+from axisight.gap.ranking.fitted_hypothesis import numbers
 from axisight.gap.search.state import SearchState
 from axisight.gap.separate.question import Seen, Turn
 from axisight.gap.views.view import View

@@ -15,7 +15,7 @@ from axisight.gap.fit.held_out import (
     step_without,
     straight_step_without,
 )
-from axisight.gap.ranking.posterior import trial
+from axisight.gap.ranking.fitted_hypothesis import trial
 from gap_data import linear_evidence
 
 

@@ -8,7 +8,7 @@ import pytest
 from axisight import Effect
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.idle_numbers import idle_numbers
-from axisight.gap.ranking.posterior import trial
+from axisight.gap.ranking.fitted_hypothesis import trial
 from gap_data import linear_evidence
 
 NAMES = ("cosine_1_rad", "sine_1_rad", "cosine_2_rad", "sine_2_rad")

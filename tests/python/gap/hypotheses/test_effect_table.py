@@ -12,7 +12,7 @@ from axisight.effects import Effect, EffectInfo, effect_table
 from axisight.effects.friction_curves import CURVES
 from axisight.gap.facts.settings import DEFAULT_TOLERANCES
 from axisight.gap.hypotheses.start_values import STARTS
-from axisight.gap.ranking.posterior import FORMULA_ERROR
+from axisight.gap.ranking.likelihood import FORMULA_ERROR
 from axisight.gap.verdict.separating_advice import separating_experiment
 
 TABLE = effect_table()

@@ -8,13 +8,10 @@ import pytest
 from axisight.effects import Effect
 from axisight.gap.fit.data_blocks import Layout, layout_of
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
-from axisight.gap.ranking.posterior import (
-    AxisPosterior,
-    FittedHypothesis,
-    clearly_worse,
-    of_one_formula,
-    stand,
-)
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
+from axisight.gap.ranking.judgement import stand
+from axisight.gap.ranking.likelihood import clearly_worse
+from axisight.gap.ranking.posterior import AxisPosterior, of_one_formula
 from gap_data import linear_evidence
 
 # The size of an effect is judged in test_gap_amplitude.py.

@@ -6,13 +6,9 @@ import pytest
 from axisight import Effect, Settings, load_robot
 from axisight.gap.fit.data_blocks import layout_of
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
-from axisight.gap.ranking.posterior import (
-    AxisPosterior,
-    FittedHypothesis,
-    RankedHypothesis,
-    likelier,
-    trial,
-)
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, trial
+from axisight.gap.ranking.likelihood import likelier
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.search.one_for_several import one_for_several, several_together
 from axisight.gap.search.search import _simpler
 from axisight.gap.views.closed_loop import ClosedLoopView

@@ -6,7 +6,7 @@ import pytest
 from axisight import Settings
 from axisight.gap.fit.data_blocks import layout_of
 from axisight.gap.fit.held_out import held_out_loss
-from axisight.gap.ranking.posterior import trial
+from axisight.gap.ranking.fitted_hypothesis import trial
 from axisight.gap.screening.restart_look_alike import ended_at_bound
 from axisight.gap.search.pairs import Pairs
 from axisight.gap.views.choice import view_of

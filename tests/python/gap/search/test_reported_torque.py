@@ -9,7 +9,8 @@ from axisight import Effect
 from axisight.gap.facts.algebraic_cause import AlgebraicCause
 from axisight.gap.facts.result import Interval
 from axisight.gap.fit.fitted_model import Hypothesis
-from axisight.gap.ranking.posterior import AxisPosterior, FittedHypothesis, RankedHypothesis
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.search.reported_torque import with_constants_told
 from axisight.gap.search.state import Round, SearchState
 from gap_data import linear_evidence

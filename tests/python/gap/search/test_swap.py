@@ -11,7 +11,8 @@ from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.fit.tolerance_edges import BENT, bent
-from axisight.gap.ranking.posterior import AxisPosterior, FittedHypothesis, RankedHypothesis
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.search.revision import weigh_again
 from axisight.gap.search.swap import (
     mending,

@@ -1,0 +1,159 @@
+"""The judgement of an axis: rules, in order, make the belief in each hypothesis from its held-out loss."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import effect_info
+from axisight.gap.facts.trace import NONE, UNKNOWN
+from axisight.gap.fit.amplitude_significance import amplitude_significance
+from axisight.gap.fit.data_blocks import Layout
+from axisight.gap.fit.fitted_model import FittedModel
+from axisight.gap.ranking.belief import Belief
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, are_lags
+from axisight.gap.ranking.formula_error import held_apart
+from axisight.gap.ranking.likelihood import FORMULA_ERROR, INDEPENDENT_BLOCKS, PARAMETER_COST
+from axisight.gap.ranking.plainer_law import held_to_plainer
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
+
+Array = NDArray[np.float64]
+
+
+def stand(
+    trials: Sequence[FittedHypothesis],
+    current: Array,
+    floor: Array,
+    layout: Layout,
+    axis: int,
+    *,
+    explained_share: float,
+) -> AxisPosterior | None:
+    """Rank the candidates that lower the loss of ``axis`` (from 0); None if there is none.
+
+    ``current`` and ``floor`` (n_blocks,): held-out loss without the candidates and of a perfect
+    model. Likelihood ratio of the held-out error on the axis with unknown variance, formula error
+    added, one cost per fitted number. *No cause* leaves the loss what it is. *Something unknown*
+    counts as a candidate that explains ``explained_share``: one that explains less is less
+    probable than a cause nobody has thought of.
+    """
+    here = layout.axis == axis
+    before, least = float(current[here].sum()), float(floor[here].sum())
+    explainable = max(before - least, 1e-12)
+    mine = [t for t in trials if t.held_out[here].sum() < before]
+    if not mine:
+        return None
+    losses = np.array([t.held_out[here].sum() for t in mine])
+    hypotheses = np.append(losses, [before, before - explained_share * explainable])
+    tempered = np.maximum(hypotheses, least) + FORMULA_ERROR * explainable
+    # An unknown cause has as many numbers to it as the known one that explains most.
+    unknown = mine[int(np.argmin(losses))].cost
+    cost = np.array([*_costs(mine), 0.0, PARAMETER_COST * unknown])
+    belief = Belief([*(t.label for t in mine), NONE, UNKNOWN])
+    likelihood = -0.5 * INDEPENDENT_BLOCKS * np.log(tempered)
+    belief.becomes("likelihood", likelihood, against=likelihood[-2])
+    belief.becomes("cost", likelihood - cost)
+    fitted = np.array([_fitted_loss(t.fitted, here) for t in mine])
+    apart = held_apart(
+        [t.hypothesis for t in mine],
+        axis,
+        belief.log_weight,
+        losses,
+        explainable,
+        least,
+        lambda left, which: -0.5 * INDEPENDENT_BLOCKS * np.log(left) - cost[which],
+    )
+    belief.becomes("formula_error", apart)
+    explained = (before - losses) / explainable
+    better = _with_those_that_fit_better(mine, belief.log_weight, explained, fitted, cost)
+    belief.becomes("better_fit", better)
+    tried = [t.hypothesis.effect for t in mine]
+    plainer = held_to_plainer(tried, [t.fitted for t in mine], belief.log_weight, layout.stretch)
+    belief.becomes("plainer_law", plainer)
+    probability = belief.probabilities()
+    samples = float(layout.samples()[axis])
+    ranked = [
+        RankedHypothesis(
+            t,
+            float((before - loss) / explainable),
+            float((before - loss) / samples),
+            _significance(t, current, layout, axis, explains=p > probability[-1]),
+            float(p),
+        )
+        for t, loss, p in zip(mine, losses, probability, strict=False)
+    ]
+    ranked.sort(key=lambda r: (-r.probability, -r.score, r.trial.label))
+    none, unknown = (float(p) for p in probability[-2:])
+    return AxisPosterior(axis, tuple(ranked), none, unknown, tuple(belief.ledger))
+
+
+def _costs(trials: Sequence[FittedHypothesis]) -> Array:
+    """Return what the numbers of each trial cost (n_trials,).
+
+    What is like another effect at some values of its parameters is no rarer, where neither leaves more, than its
+    resemblance has it: its further numbers cost no more than that.
+    """
+    out = PARAMETER_COST * np.array([t.cost for t in trials])
+    places = {(t.hypothesis.effect.name, t.hypothesis.effect.axis): i for i, t in enumerate(trials)}
+    for (name, axis), i in places.items():
+        like = effect_info(name).resembles
+        if like is not None and (like.law, axis) in places:
+            out[i] = min(out[i], out[places[like.law, axis]] + float(np.log(like.rarer)))
+    return out
+
+
+# Half of it is a log-likelihood ratio; and fits of candidates end at a share of their loss, of which
+# they leave open about as much again.
+_BETTER = 4.0
+
+_LEFT_OPEN = 2e-3
+
+# Share of what there is to explain by which it may predict worse all the same.
+_NEARLY = 0.1
+
+
+def _fitted_loss(fitted: FittedModel, here: NDArray[np.bool_]) -> float:
+    """Return the loss of a fit on some blocks, with what the simulator's own parameters went off."""
+    precision = np.diag(fitted.prior_matrix)
+    told = precision > 0
+    off = fitted.prior_gradient[told] ** 2 / precision[told]
+    return float(fitted.loss[here].sum() + off.sum())
+
+
+def _with_those_that_fit_better(
+    trials: Sequence[FittedHypothesis], logp: Array, score: Array, fitted: Array, cost: Array
+) -> Array:
+    """Return log-probabilities with rivals as probable as the first that fit the logs better than it.
+
+    With few logs, what is predicted without one hangs on what the others tell of the simulator's own
+    parameters. Where of two that explain the same share the one predicts better and the other, with no more
+    numbers to it, fits better, neither is surer; of lags, neither is where it fits as well. ``fitted``: loss of
+    the fits on the axis; ``cost``: logarithmic, of what the numbers of each cost.
+    """
+    first = int(np.argmax(logp[: len(trials)]))
+    leeway = max(_BETTER, _LEFT_OPEN * fitted[first])
+    out = logp.copy()
+    for i, t in enumerate(trials):
+        if i == first or score[i] <= score[first] - _NEARLY:
+            continue
+        if are_lags(t, trials[first]):
+            if score[i] > score[first] - FORMULA_ERROR and fitted[i] < fitted[first] + leeway:
+                out[i] = max(out[i], logp[first] + cost[first] - cost[i])
+        elif fitted[i] < fitted[first] - leeway and t.cost <= trials[first].cost:
+            out[i] = logp[first]
+    return out
+
+
+def _significance(
+    t: FittedHypothesis, current: Array, layout: Layout, axis: int, *, explains: bool
+) -> float:
+    """Return how sure a trial is on an axis: by its gain, or by its size.
+
+    The size counts where the effect acts itself and ``explains`` the axis: one that explains part
+    of it has a size too, whatever the cause is.
+    """
+    gain = layout.significance(current, t.held_out, axis)
+    own = t.hypothesis.effect.acts_on(axis + 1)
+    return max(gain, amplitude_significance(t.fitted, layout.stretch)) if own and explains else gain
