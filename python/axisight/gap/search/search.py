@@ -23,15 +23,8 @@ from axisight.gap.screening.column_cache import ColumnCache
 from axisight.gap.screening.promise import HOPELESS
 from axisight.gap.screening.screening import kept_beside
 from axisight.gap.screening.search_round import Progress, SearchRound, fresh, interact
+from axisight.gap.search.moves import AFTER_EACH_ROUND, AT_THE_END, Context, make
 from axisight.gap.search.pairs import Pairs, in_parts, without_rival_composites
-from axisight.gap.search.revision import (
-    drop_idle,
-    finish,
-    merge,
-    straighten,
-    weigh_again,
-    withdraw_doubtful,
-)
 from axisight.gap.search.state import OPEN, Round, SearchState
 from axisight.statistics.tails import normal_deviate
 
@@ -99,16 +92,10 @@ def search(
             refused.add(taken[0][0].trial.label)
             out.skipped[taken[0][0].trial.label] = str(diverged)
             continue
-        refused |= drop_idle(fitter, out, settings)
-        refused |= merge(fitter, out, settings, offered)
+        refused |= make(AFTER_EACH_ROUND, Context(fitter, out, settings, offered))
         if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
             break
-    if not fitter.adds_up:
-        weigh_again(fitter, out, settings)
-    straighten(fitter, out)
-    if not fitter.adds_up:
-        withdraw_doubtful(fitter, out, settings)
-    finish(fitter, out)
+    make(AT_THE_END, Context(fitter, out, settings))
     return out
 
 
