@@ -47,7 +47,7 @@ class AxisPosterior:
     """How the candidates stand on one axis (from 0), best first; with the two that are none.
 
     ``ledger``: the entries that made their log-weights, in order. A probability changes only by `adjusted`,
-    `exchanged` and `joined`, and each writes there what it did.
+    `without`, `exchanged` and `joined`, and each writes there what it did.
     """
 
     axis: int
@@ -62,16 +62,28 @@ class AxisPosterior:
         return self.ranked[0]
 
     def adjusted(self, rule: str, odds: Mapping[str, float]) -> AxisPosterior:
-        """Return the same with candidates, by label, counted for so many times as probable; without those of zero."""
+        """Return the same with candidates, by label, counted for so many times as probable."""
         weighed = [(odds.get(r.trial.label, 1.0), r) for r in self.ranked]
-        left = [(times * r.probability, r) for times, r in weighed if times > 0]
-        if any(times != 1 for times, _ in weighed if times > 0):
+        changed = [(times, r) for times, r in weighed if times != 1]
+        left = [(times * r.probability, r) for times, r in weighed]
+        if changed:
             left.sort(key=lambda pair: -pair[0])
-        whole = sum(weight for weight, _ in left) + self.p_none + self.p_unknown
-        entries = (Adjustment(rule, r.trial.label, log_odds(x)) for x, r in weighed if x != 1)
+        return self._of(left, [Adjustment(rule, r.trial.label, log_odds(x)) for x, r in changed])
+
+    def without(self, *labels: str) -> AxisPosterior:
+        """Return the same without some candidates, by label."""
+        left = [(r.probability, r) for r in self.ranked if r.trial.label not in labels]
+        gone = [r.trial.label for r in self.ranked if r.trial.label in labels]
+        return self._of(left, [Adjustment("not_a_cause", x, log_odds(0.0)) for x in gone])
+
+    def _of(
+        self, weighed: Sequence[tuple[float, RankedHypothesis]], entries: Sequence[Adjustment]
+    ) -> AxisPosterior:
+        """Return the same of candidates with other weights, normalised anew."""
+        whole = sum(weight for weight, _ in weighed) + self.p_none + self.p_unknown
         return AxisPosterior(
             self.axis,
-            tuple(replace(r, probability=weight / whole) for weight, r in left),
+            tuple(replace(r, probability=weight / whole) for weight, r in weighed),
             self.p_none / whole,
             self.p_unknown / whole,
             (*self.ledger, *entries),
@@ -112,10 +124,6 @@ class AxisPosterior:
     def without_first(self, count: int) -> AxisPosterior:
         """Return the same without its first candidates."""
         return self.without(*(r.trial.label for r in self.ranked[:count]))
-
-    def without(self, *labels: str) -> AxisPosterior:
-        """Return the same without some candidates, by label."""
-        return self.adjusted("not_a_cause", dict.fromkeys(labels, 0.0))
 
     def with_axes_it_leads(self, others: Sequence[AxisPosterior]) -> AxisPosterior:
         """Return the same with rivals held against the first where they do worst.

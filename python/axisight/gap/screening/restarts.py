@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Protocol
 
 from axisight.fitting.divergence import Diverged
@@ -113,6 +114,9 @@ class Restarts:
         """Return the loss that one linear step from a restart leads to; infinite where it does not hold."""
         leader, option, values = one
         part = self.round.rough or self.round.fitter
+        if part is not self.round.fitter:
+            # Its sensitivities are those of all of the data.
+            leader = replace(leader, columns={})
         at = part.evaluate([*leader.free[:-1], option], leader, robot_values=values)
         return float("inf") if isinstance(at, Diverged) else at.total - linear_gain(at)
 

@@ -85,6 +85,14 @@ def test_other_axes_hold_a_rival_by_what_they_say():
     assert_adds_up(here.with_axes_rivals_lead([elsewhere]))
 
 
+def test_a_rival_that_does_nothing_elsewhere_is_out_of_question_and_still_told():
+    elsewhere = standing([a_trial("coulomb_friction", 2, np.full(40, 1.1))])
+    held = three().with_axes_it_leads([elsewhere])
+    assert len(held.ranked) == 3
+    assert [r.probability for r in held.ranked[1:]] == [0.0, 0.0]
+    assert_adds_up(held)
+
+
 def test_a_belief_keeps_no_entry_of_what_changes_nothing():
     belief = Belief(["a", "b"])
     belief.becomes("likelihood", np.array([3.0, 1.0]), against=1.0)
