@@ -465,6 +465,7 @@ def test_the_loss_over_the_width_of_a_play_is_smooth():
     view = ClosedLoopView(bare_axis(), logs, Settings())
     tight = copy(view.fitter)
     tight.robot = view.robot
+    tight = tight.along(tight.records)
     widths = true * np.linspace(0.9, 1.1, 41)
 
     def losses(fitter: ClosedLoopFitter) -> list[float]:
