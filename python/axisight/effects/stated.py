@@ -85,15 +85,6 @@ RIGID_BODY_QUANTITIES = {
 DRY_FRICTION = ("coulomb_friction", "coulomb_nm", "smoothing_rad_s")
 """What the dry friction of a joint in a model file is, its moment and its corner: of the motor."""
 
-UNEVEN = ("position_dependent_friction", "mean_nm")
-"""Dry friction that changes with the angle, and its parameter for what does not."""
-
-STRIBECK = (
-    "stribeck_friction",
-    *("coulomb_nm", "excess_nm", "stribeck_speed_rad_s", "smoothing_rad_s"),
-)
-"""Dry friction that is larger at standstill: its moment, excess, the speed over which that falls, its corner."""
-
 BEHIND_GEAR = "arm_share"
 """Which share of a friction the arm feels, behind an elastic gear: a parameter of friction laws without a memory."""
 
@@ -102,9 +93,6 @@ BRISTLES = ("presliding_friction", "presliding_rad", "relaxation_s")
 
 In torque that is predicted from motion it slips all the time, and is dry friction.
 """
-
-WARMING = "friction_warmup"
-"""What viscous friction is that changes while a machine warms up."""
 
 VISCOUS_FRICTION = "viscous_friction"
 """What friction in proportion to speed is, beyond the simulator's."""
@@ -134,20 +122,11 @@ Parameters: the shift in the frame of the link; its own; angles about x and y.
 JOINT_SPRING = ("cable_stiffness", "stiffness_nm_rad", "at_zero_nm")
 """What a spring of a joint is: its stiffness, and its torque where the joint is at zero."""
 
-STIFFER = ("joint_stiffness", "relative_change")
-"""What a gear of another stiffness is, and its parameter."""
-
-CONSTANT = ("torque_offset", "offset_nm")
-"""What a constant torque of the motor is, and its parameter."""
-
 LAG = ("actuator_bandwidth", "time_constant_s")
 """What a drive that follows its command with a first-order lag is, and its parameter."""
 
 TRANSPORT_DELAY = ("input_delay", "delay_s")
 """What a drive that acts late is, and its parameter."""
-
-CURRENT_LOOP = ("current_loop", "time_constant_s", "damping")
-"""What a drive with a lag of second order is, and its parameters."""
 
 TORQUE_LIMIT = ("torque_saturation", "limit_nm")
 """What flat tops of a logged torque are, and its parameter."""
@@ -167,30 +146,6 @@ FEEDFORWARD = ("feedforward_missing", ("acceleration_nm_s2_rad", "speed_nm_s_rad
 CLOCK = ("clock_drift", "relative_rate")
 """What a clock of its own is, and its parameter."""
 
-ONE_FORMULA = frozenset(
-    {
-        "payload",
-        "motor_inertia",
-        "gravity_compensation",
-        "link_mass",
-        "link_com",
-        "link_inertia",
-        "link_geometry",
-        "rotor_inertia",
-        "base_tilt",
-        "joint_zero_offset",
-        "torque_constant",
-        "torque_offset",
-    }
-)
-"""What weight, inertia and constant errors of torque are: whoever writes them, the formula is the same."""
-
-OF_ITS_AXIS = frozenset({"motor_inertia", "gravity_compensation"})
-"""Of these, what changes the torque of its own axis alone."""
-
-OF_POSES = frozenset({"joint_zero_offset", "link_geometry", "base_tilt"})
-"""Of these, what changes where the arm is, before its axis and behind."""
-
 STEPS = ("position_quantization", "increment_rad")
 """What an encoder of few lines is, and its parameter."""
 
@@ -199,9 +154,6 @@ TORQUE_CONSTANT = ("torque_constant", "relative_error")
 
 TORQUE_SENSOR = ("torque_sensor_gain", "relative_error")
 """What a torque that is reported too large or too small is, and its parameter."""
-
-KNEE = ("piecewise_stiffness", "step", "knee_rad")
-"""What a gear is whose stiffness changes at a deflection, and its parameters: by how much, and where."""
 
 PLAY = ("backlash", "damped")
 """What a gear has whose middle is without stiffness, and its parameter for what is damped there."""

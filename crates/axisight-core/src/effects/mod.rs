@@ -30,7 +30,6 @@ const SMOOTHING: ParameterInfo = ParameterInfo {
     marks: &[Mark::Notation],
     prior: Prior::LogNormal { spread: 1.5 },
     sizes: "judgement: how sharply a sign turns, over machines and those who write it, a factor of twenty either way (95 %)",
-    ..ParameterInfo::PLAIN
 };
 
 /// Speed of the motor over which a dry friction falls from standstill.

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import effect_table
+
 Array = NDArray[np.float64]
 
 
@@ -12,7 +14,7 @@ Array = NDArray[np.float64]
 # independent in a likelihood ratio.
 INDEPENDENT_BLOCKS = 60.0
 
-FORMULA_ERROR = 0.02
+FORMULA_ERROR = max(info.formula.error for info in effect_table().values())
 """Share of the explained error by which two formulas for one physical effect may differ (tanh or algebraic
 Coulomb, play or dead zone): differences in fit below it say nothing about the cause."""
 
