@@ -21,7 +21,7 @@ from axisight.blind import Share
 from axisight.blind.drawing import scattered
 from axisight.blind.motions import MOTIONS
 from axisight.gap.facts.result import DetectionLimit
-from axisight.gap.ranking.indistinguishable import twins_of
+from axisight.gap.ranking.twins import twins_of
 
 Array = NDArray[np.float64]
 References = dict[str, tuple[str, Array]]

@@ -68,7 +68,7 @@ fn describe<'py>(py: Python<'py>, info: &EffectInfo) -> PyResult<Bound<'py, PyDi
     out.set_item("usual_odds", info.usual_odds)?;
     out.set_item("twins", info.twins.to_vec())?;
     out.set_item("twins_alone", info.twins_alone)?;
-    kin(&out, info)?;
+    relations(&out, info)?;
     let stands_for = info.stands_for.map(|s| (s.quantity, word(&s.change)));
     out.set_item("stands_for", stands_for)?;
     let linear = match info.linear {
@@ -107,7 +107,7 @@ fn parameter<'py>(py: Python<'py>, p: &ParameterInfo) -> PyResult<Bound<'py, PyD
 }
 
 /// How an effect and others are akin.
-fn kin(out: &Bound<'_, PyDict>, info: &EffectInfo) -> PyResult<()> {
+fn relations(out: &Bound<'_, PyDict>, info: &EffectInfo) -> PyResult<()> {
     let py = out.py();
     let resembles = info.resembles.map(|r| resembles(py, &r)).transpose()?;
     out.set_item("resembles", resembles)?;

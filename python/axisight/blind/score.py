@@ -15,7 +15,7 @@ from axisight.blind.sealed import SEAL, seal_of
 from axisight.documents import parse_json, read_text
 from axisight.effects import effect_table
 from axisight.errors import InputError
-from axisight.gap.ranking.indistinguishable import TWIN_SHARE, twins_of
+from axisight.gap.ranking.twins import TWIN_SHARE, twins_of
 
 SEVERE = 3.0
 """Change of the torque over its noise from which an effect counts as there to be found."""

@@ -11,8 +11,8 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from axisight import _core
-from axisight.effects.kin import BegunFrom, Formula, Later, Plainer, Resembles, SpringChange
 from axisight.effects.priors import half_normal, log_normal
+from axisight.effects.relations import BegunFrom, Formula, Later, Plainer, Resembles, SpringChange
 from axisight.errors import InputError
 
 Mark = Literal["optional", "place", "notation", "fastest_time", "shows_inverse", "held_first"]
@@ -70,7 +70,7 @@ class EffectInfo:
     met more often that this one looks like where speed, load or pose hardly change, ``usual_odds`` how many times
     as often this one is met, where it is the usual one. ``twins``: effects of
     which a machine gives the very same logs of commands and motor angles, ``twins_alone``: of an axis alone.
-    ``resembles``, ``plainer``, ``begun_from``, ``later``, ``formula``, ``spring``: `axisight.effects.kin`.
+    ``resembles``, ``plainer``, ``begun_from``, ``later``, ``formula``, ``spring``: `axisight.effects.relations`.
     ``law_of``: what it is a law of, if an axis has one of that. ``scales``: whose torques it changes as another
     unit of torque would, its own, those of all that carries its axis, or every axis'.
     ``stands_for``: quantity of the robot's joint that the effect changes, and whether its first

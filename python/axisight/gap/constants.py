@@ -6,8 +6,10 @@ import ast
 import io
 import tokenize
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
+
+from axisight.gap.facts.settings import Settings
 
 _ROOT = Path(__file__).parent
 
@@ -29,6 +31,20 @@ def constants(root: Path = _ROOT) -> list[Constant]:
     """Return the constants of all files below ``root``, file by file."""
     paths = sorted(p for p in root.rglob("*.py") if p.name != "__init__.py")
     return [c for path in paths for c in _of_file(path, path.relative_to(root).as_posix())]
+
+
+def settings() -> list[Constant]:
+    """Return the numbers that a user may set, with their defaults."""
+    return [
+        Constant(
+            "facts/settings.py",
+            f"Settings.{f.name}",
+            repr(f.default),
+            "May be set: see `Settings`.",
+        )
+        for f in fields(Settings)
+        if isinstance(f.default, int | float)
+    ]
 
 
 def _of_file(path: Path, place: str) -> Iterator[Constant]:
@@ -96,7 +112,7 @@ def _ends(line: int, comments: dict[int, str]) -> bool:
 
 def main() -> None:
     """Print each constant on a line, and what it rests on below."""
-    for one in constants():
+    for one in [*settings(), *constants()]:
         print(f"{one.place}: {one.name} = {one.value}\n    {one.words}")
 
 

@@ -11,6 +11,8 @@ import scipy
 from axisight.errors import InputError
 from axisight.logs.log import Floats
 
+LOWPASS_ORDER = 4
+"""Order of the low-pass, run forward and backward: of everything that is low-passed, unless it says another."""
 _DECIMATION_SHARE = 0.8
 """Cutoff of the decimation filter as a share of the new Nyquist frequency."""
 _PADDING_PERIODS = 10.0
@@ -18,7 +20,12 @@ _PADDING_PERIODS = 10.0
 
 
 def lowpass(
-    x: Floats, sample_time_s: float, cutoff_hz: float, order: int = 4, *, curved: bool = False
+    x: Floats,
+    sample_time_s: float,
+    cutoff_hz: float,
+    order: int = LOWPASS_ORDER,
+    *,
+    curved: bool = False,
 ) -> Floats:
     """Filter `x` (n,) or (n, k) along its first dimension with a zero-phase Butterworth low-pass.
 
@@ -80,7 +87,7 @@ def differentiate(
     position: Floats,
     sample_time_s: float,
     cutoff_hz: float,
-    order: int = 4,
+    order: int = LOWPASS_ORDER,
     *,
     curved: bool = False,
 ) -> tuple[Floats, Floats]:
@@ -99,7 +106,7 @@ def differentiate(
     return np.asarray(velocity, dtype=np.float64), acceleration / sample_time_s**2
 
 
-def decimate_zero_phase(x: Floats, factor: int, order: int = 4) -> Floats:
+def decimate_zero_phase(x: Floats, factor: int, order: int = LOWPASS_ORDER) -> Floats:
     """Keep every `factor`-th sample of `x` (n,) or (n, k) after a zero-phase low-pass.
 
     The low-pass cuts at 0.8 of the new Nyquist frequency. Filtering both sides of a regression

@@ -16,6 +16,7 @@ from axisight.gap.facts.trace import (
     Comparison,
     Step,
     Trace,
+    Work,
 )
 
 # Rivals of the first that are told, beside none and unknown.
@@ -32,13 +33,14 @@ class Account:
 
     ``comparisons``: of each axis and round a line on the first and lines on its rivals; ``moves`` of the
     search in order; ``named``: what changed a probability once a cause was named; ``rules``: the rules
-    that the lines name, each with its reason.
+    that the lines name, each with its reason; ``work``: what all of it cost.
     """
 
     comparisons: tuple[tuple[str, tuple[str, ...]], ...]
     moves: tuple[str, ...]
     named: tuple[str, ...]
     rules: tuple[str, ...]
+    work: tuple[str, ...]
 
     def lines(self) -> Iterator[str]:
         """Yield the account line by line, rivals indented."""
@@ -48,6 +50,7 @@ class Account:
         yield from self.moves
         yield from self.named
         yield from self.rules
+        yield from self.work
 
 
 def account(trace: Trace) -> Account:
@@ -61,6 +64,7 @@ def account(trace: Trace) -> Account:
         tuple(f"move {k}, {_move(step)}" for k, step in enumerate(trace.steps, start=1)),
         tuple(f"{x.hypothesis}, once named: {_entry(x.rule, x.nats)}." for x in trace.named),
         tuple(f"{_plain(rule)}: {RULES[rule]}" for rule in used),
+        _work(trace.work),
     )
 
 
@@ -115,6 +119,15 @@ def _lost(
 
 def _entry(rule: str, nats: float) -> str:
     return f"{_plain(rule)} {nats:+.1f}"
+
+
+def _work(work: Work) -> tuple[str, ...]:
+    if work == Work():
+        return ()
+    return (
+        f"work: {work.fits} fits with {work.steps} steps and {work.evaluations} evaluations; "
+        f"{work.linearizations} linearizations.",
+    )
 
 
 def _plain(rule: str) -> str:

@@ -21,7 +21,7 @@ def test_the_command_prints_where_each_stands(capsys):
     main()
     printed = capsys.readouterr().out
     assert "FORMULA_ERROR" in printed
-    assert "posterior.py" in printed
+    assert "Settings.explained_share = 0.6" in printed
 
 
 def test_words_are_the_docstring_or_the_comment_beside_or_above(tmp_path: Path):

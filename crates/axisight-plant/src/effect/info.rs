@@ -4,8 +4,8 @@
 //! them by name, but for the start values of a search.
 
 use super::formula::Formula;
-use super::kin::{BegunFrom, Later, LawOf, Plainer, Resembles, Scales, SpringChange};
 use super::prior::Prior;
+use super::relations::{BegunFrom, Later, LawOf, Plainer, Resembles, Scales, SpringChange};
 
 /// What an effect belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

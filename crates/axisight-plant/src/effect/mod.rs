@@ -4,8 +4,8 @@ mod error;
 mod formula;
 mod info;
 mod kernel;
-mod kin;
 mod prior;
+mod relations;
 
 pub use error::EffectError;
 pub use formula::{Formula, FormulaKind, Held};
@@ -17,5 +17,5 @@ pub use kernel::{
     Arm, AxisTorque, BaseJoint, CoupledAxis, Deflected, GearError, Joint, Kernel, Motor, Pair,
     PlantParameters, Spring,
 };
-pub use kin::{BegunFrom, Later, LawOf, Plainer, Resembles, Scales, Shown, SpringChange};
 pub use prior::Prior;
+pub use relations::{BegunFrom, Later, LawOf, Plainer, Resembles, Scales, Shown, SpringChange};

@@ -109,15 +109,30 @@ class Step:
 
 
 @dataclass(frozen=True)
+class Work:
+    """What a search cost, whatever the machine.
+
+    ``fits``, their accepted ``steps`` and the ``evaluations`` of the model in them; ``linearizations``:
+    models evaluated with their sensitivities and not fitted.
+    """
+
+    fits: int = 0
+    steps: int = 0
+    evaluations: int = 0
+    linearizations: int = 0
+
+
+@dataclass(frozen=True)
 class Trace:
     """Comparisons and moves in the order in which the search made them.
 
-    ``named``: what changed the probability of a cause once it was named.
+    ``named``: what changed the probability of a cause once it was named. ``work``: what it cost.
     """
 
     comparisons: tuple[Comparison, ...] = ()
     steps: tuple[Step, ...] = ()
     named: tuple[Adjustment, ...] = ()
+    work: Work = Work()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the trace as the verdict's JSON has it; what was taken out has null for nats."""

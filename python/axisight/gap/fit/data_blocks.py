@@ -66,7 +66,7 @@ class Layout:
 
 
 def layout_of(fitted: FittedModel) -> Layout:
-    """Return where the blocks of a model's evidence lie.
+    """Return where the blocks of a fitted model lie.
 
     The stretches of a log count for as much each: one in which every axis stands would say nothing,
     and nothing is no scatter.

@@ -23,6 +23,7 @@ from axisight.fitting import (
 from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis, NormalEquations
 from axisight.gap.fit.rank_deficiency import deviations_seen
+from axisight.gap.fit.work_count import WorkCount
 from axisight.gap.simulator.natural_sizes import NaturalSizes
 from axisight.gap.simulator.own_parameters import for_core
 from axisight.gap.simulator.tolerances import spring_changes, tolerance_of
@@ -63,6 +64,8 @@ class ModelFitter(ABC):
         self.weighting = weighting
         self.block_s = block_s
         self.cancel = _core.CancelToken()
+        # One count for a fitter and all that are made of it.
+        self.work = WorkCount()
         self.tolerances = tolerances
         self.natural: NaturalSizes | None = None
         self.own = [
@@ -247,7 +250,8 @@ class ModelFitter(ABC):
         result = self.solve(*self._for_core(setup), options, setup.warm, near)
         if isinstance(result, Diverged):
             return result
-        return _evidence(result, setup, list(free), renewed=renewed, counted=self.counted())
+        self.work.fit(result.iterations, result.evaluations)
+        return _fitted_model(result, setup, list(free), renewed=renewed, counted=self.counted())
 
     def evaluate(
         self,
@@ -298,6 +302,7 @@ class ModelFitter(ABC):
         result = self.linearize(*self._for_core(setup), options, setup.warm, near)
         if isinstance(result, Diverged):
             return result
+        self.work.linearization()
         return replace(_linearized(result, setup), jacobian=tuple(result.columns))
 
     def replaced(self, free: Sequence[Hypothesis]) -> set[str]:
@@ -441,7 +446,7 @@ def _linearized(result: _core.FitResult | _core.Linearization, setup: _Setup) ->
     )
 
 
-def _evidence(
+def _fitted_model(
     result: _core.FitResult,
     setup: _Setup,
     free: Sequence[Hypothesis],

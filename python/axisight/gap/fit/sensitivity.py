@@ -54,7 +54,7 @@ def sensitivity(
 ) -> Sensitivity | None:
     """Return the sensitivity of a candidate that does nothing as it is; None of any other.
 
-    ``evidence``: the model with the candidate, last; ``axis`` (n_blocks,) of the blocks.
+    ``fitted``: the model with the candidate, last; ``axis`` (n_blocks,) of the blocks.
     """
     info = effect_info(option.effect.name)
     sizes = {p.name for p in info.parameters if p.role == "amplitude"}

@@ -1,6 +1,6 @@
 """Start values, bounds and priors of effects from data: one table entry per effect.
 
-An entry takes a :class:`Trial` and returns the effect with what is free in it, or None where the
+An entry takes a :class:`StartContext` and returns the effect with what is free in it, or None where the
 data have nothing to start from.
 """
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from axisight.effects import Effect, effect_info, effect_table
-from axisight.effects.kin import Resembles
+from axisight.effects.relations import Resembles
 from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.model_fitter import ModelFitter

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
-from axisight.effects.kin import FORMULA_KINDS
+from axisight.effects.relations import FORMULA_KINDS
 from axisight.gap.fit.fitted_model import Hypothesis
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
 from axisight.effects.friction_curves import rise_over_high_speed
-from axisight.effects.kin import Plainer
+from axisight.effects.relations import Plainer
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.held_out import step_without
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from axisight.effects import Effect, effect_info, effect_table
-from axisight.effects.kin import Later
+from axisight.effects.relations import Later
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from axisight.effects import Effect, effect_table
-from axisight.effects.kin import BegunFrom
+from axisight.effects.relations import BegunFrom
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.posterior import AxisPosterior

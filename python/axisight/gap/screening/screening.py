@@ -229,7 +229,7 @@ class Screening:
         return [sizes.at(option.at(v).effect.parameters or {}) for v in option.starts]
 
     def _start(self, option: Hypothesis, fitted: NormalEquations | None) -> Start:
-        """Return a candidate with what one linear step promises where ``evidence`` has it."""
+        """Return a candidate with what one linear step promises where ``fitted`` has it."""
         if fitted is None:
             return Start(option, self.model.robot_values, -np.inf)
         gain = self.model.total - fitted.total + linear_gain(fitted) - self._own

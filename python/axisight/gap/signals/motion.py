@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from axisight.errors import InputError
 from axisight.logs import Log, differentiate, lowpass
+from axisight.logs.filters import LOWPASS_ORDER
 
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array, Array, Array]
@@ -23,8 +24,8 @@ _ABOVE = 2.0
 _BELOW_NYQUIST = 0.45
 # Periods of the cutoff after which its low-pass has forgotten all but a thousandth.
 _RINGS = 3.0
-# The low-pass of `axisight.logs.lowpass`: fourth order, forward and backward.
-_ORDER = 8
+# Of the gain of the low-pass, which runs forward and backward.
+_ORDER = 2 * LOWPASS_ORDER
 # Of a log that begins or ends in motion, periods of the cutoff until what was before or after it is forgotten
 # to a hundredth, and the largest share of the log at either end.
 _FORGETS = 1.5

@@ -21,9 +21,9 @@ from axisight.gap.measure.gap_figures import gap_figures, stage
 from axisight.gap.measure.motion_errors import motion_errors, velocity_from
 from axisight.gap.measure.where import band_map, findings, led_by_weight, regime_maps
 from axisight.gap.search.account import trace_of
-from axisight.gap.search.prior_strain import bent_for
 from axisight.gap.signals.encoder_steps import encoder_steps
 from axisight.gap.simulator.own_parameters import nominal_and_size, nominal_values
+from axisight.gap.verdict.bent_simulator import bent_for
 from axisight.gap.verdict.carry_over import carried_over, open_check
 from axisight.gap.verdict.coarse_encoders import with_coarse_encoders
 from axisight.gap.verdict.conclusion import Conclusion
@@ -101,7 +101,11 @@ def assembled(
             *parameters_at_edge(fitted, nominal, tolerances),
         ),
         settings=settings.as_dict(robot),
-        trace=replace(trace_of(found), named=tuple(x for c in conclusion.causes for x in c.ledger)),
+        trace=replace(
+            trace_of(found),
+            named=tuple(x for c in conclusion.causes for x in c.ledger),
+            work=view.fitter.work.done,
+        ),
         provenance=_provenance(robot, view, names, settings),
     )
 

@@ -17,14 +17,14 @@ from axisight.gap.facts.settings import Settings
 from axisight.gap.facts.trace import Adjustment, log_odds
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.held_out import held_out_loss
-from axisight.gap.ranking.indistinguishable import (
+from axisight.gap.ranking.intervals import intervals
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
+from axisight.gap.ranking.twins import (
     about_twins,
     less_their_twins,
     open_twins,
     with_twins,
 )
-from axisight.gap.ranking.intervals import intervals
-from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.search.state import SearchState
 from axisight.gap.verdict.separating_advice import separating_experiment
 

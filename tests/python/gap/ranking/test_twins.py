@@ -8,7 +8,7 @@ from axisight.blind.score import _judged
 from axisight.effects import effect_table
 from axisight.gap.facts.named_cause import NamedCause
 from axisight.gap.facts.result import Candidate
-from axisight.gap.ranking.indistinguishable import (
+from axisight.gap.ranking.twins import (
     about_twins,
     less_their_twins,
     open_twins,

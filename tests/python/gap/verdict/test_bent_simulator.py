@@ -7,8 +7,8 @@ from axisight.fitting import robot_parameters
 from axisight.gap.fit.data_blocks import layout_of
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.fit.tolerance_edges import BENT, bent
-from axisight.gap.search.prior_strain import bent_for
 from axisight.gap.search.state import SearchState
+from axisight.gap.verdict.bent_simulator import bent_for
 from axisight.gap.views.closed_loop import ClosedLoopView
 from gap_data import bare_axis, logs_of
 
