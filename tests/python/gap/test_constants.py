@@ -20,7 +20,7 @@ def test_constants_do_not_become_more():
 def test_the_command_prints_where_each_stands(capsys):
     main()
     printed = capsys.readouterr().out
-    assert "FORMULA_ERROR" in printed
+    assert "INDEPENDENT_BLOCKS = 60.0" in printed
     assert "Settings.explained_share = 0.6" in printed
 
 
