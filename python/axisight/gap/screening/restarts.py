@@ -51,7 +51,7 @@ class Field(Protocol):
 
 
 # Starts of one hypothesis that are fitted: the first by promise, and one that may lie in another valley.
-_FITTED = 2
+_STARTS_FITTED = 2
 
 
 class Restarts:
@@ -102,12 +102,12 @@ class Restarts:
         by_label: dict[str, list[Restart]] = {}
         for one in begun:
             by_label.setdefault(one[1].effect.label, []).append(one)
-        crowded = [one for same in by_label.values() if len(same) > _FITTED for one in same]
+        crowded = [one for same in by_label.values() if len(same) > _STARTS_FITTED for one in same]
         promised = dict(zip(map(id, crowded), self.pool.map(self._promised, crowded), strict=True))
         return [
             one
             for same in by_label.values()
-            for one in sorted(same, key=lambda x: promised.get(id(x), 0.0))[:_FITTED]
+            for one in sorted(same, key=lambda x: promised.get(id(x), 0.0))[:_STARTS_FITTED]
         ]
 
     def _promised(self, one: Restart) -> float:

@@ -41,6 +41,14 @@ def test_every_effect_has_start_values_and_no_entry_is_stray() -> None:
     assert not wrong, wrong[0]
 
 
+def test_effects_of_one_kind_of_formula_share_its_error() -> None:
+    """They are held against one another by one error: that of the kind."""
+    errors: dict[str, set[float]] = {}
+    for info in TABLE.values():
+        errors.setdefault(info.formula.kind, set()).add(info.formula.error)
+    assert {kind: len(found) for kind, found in errors.items()} == dict.fromkeys(errors, 1)
+
+
 @pytest.mark.parametrize("info", TABLE.values(), ids=TABLE)
 def test_what_an_effect_is_akin_to_is_in_the_table(info: EffectInfo) -> None:
     own = {p.name for p in info.parameters}
