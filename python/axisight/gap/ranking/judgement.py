@@ -17,7 +17,7 @@ from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, are_lags
 from axisight.gap.ranking.formula_error import held_apart
 from axisight.gap.ranking.likelihood import FORMULA_ERROR, INDEPENDENT_BLOCKS, PARAMETER_COST
 from axisight.gap.ranking.plainer_law import held_to_plainer
-from axisight.gap.ranking.posterior import TINY, AxisPosterior, RankedHypothesis
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,6 @@ def stand(
     likelihood = -0.5 * INDEPENDENT_BLOCKS * np.log(tempered)
     belief.becomes("likelihood", likelihood, against=likelihood[-2])
     belief.becomes("cost", likelihood - cost)
-    belief.becomes("own_parameters", belief.log_weight - _bent_by(mine))
     fitted = np.array([_fitted_loss(t.fitted, here) for t in mine])
     apart = held_apart(
         [t.hypothesis for t in mine],
@@ -115,32 +114,12 @@ _LEFT_OPEN = 2e-3
 _NEARLY = 0.1
 
 
-def _bent_by(trials: Sequence[FittedHypothesis]) -> Array:
-    """Return what the prior of the simulator's own parameters says against each trial (n_trials + 2,) [nats].
-
-    Against the trial that bends them least: what all of them do tells none from another. *None* and *unknown*
-    come last. They are held against the trials by what these explain, and bend nothing themselves.
-    """
-    against = np.array([0.5 * _off_nominal(t.fitted) for t in trials])
-    return np.append(against - against.min(), [0.0, 0.0])
-
-
-def _off_nominal(fitted: FittedModel) -> float:
-    """Return how far the simulator's own parameters went off, in squared tolerances: the chi-square of their prior."""
-    own = np.array([place is None for place, _ in fitted.parameters], dtype=bool)
-    return float(_prior_terms(fitted)[own].sum())
-
-
-def _prior_terms(fitted: FittedModel) -> Array:
-    """Return what each parameter (n_parameters,) is off its prior, in squared standard deviations."""
-    precision = np.diag(fitted.prior_matrix)
-    told = np.maximum(precision, TINY)
-    return np.where(precision > 0, fitted.prior_gradient**2 / told, 0.0)
-
-
 def _fitted_loss(fitted: FittedModel, here: NDArray[np.bool_]) -> float:
-    """Return the loss of a fit on some blocks, with what its parameters went off their priors."""
-    return float(fitted.loss[here].sum() + _prior_terms(fitted).sum())
+    """Return the loss of a fit on some blocks, with what the simulator's own parameters went off."""
+    precision = np.diag(fitted.prior_matrix)
+    told = precision > 0
+    off = fitted.prior_gradient[told] ** 2 / precision[told]
+    return float(fitted.loss[here].sum() + off.sum())
 
 
 def _with_those_that_fit_better(

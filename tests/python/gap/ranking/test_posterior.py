@@ -432,38 +432,3 @@ def test_laws_of_friction_are_held_apart_where_one_leaves_hardly_more_than_noise
     assert p["asymmetric_friction"] / p["coulomb_friction"] == pytest.approx(
         (5.3 / 5.2) ** 30 / cost
     )
-
-
-def bent(trial: FittedHypothesis, *tolerances: float) -> FittedHypothesis:
-    """The same with the simulator's own parameters so many of their tolerances off."""
-    n = len(tolerances)
-    fitted = replace(
-        NO_EFFECT,
-        parameters=tuple((None, f"axis{i}.mass") for i in range(n)),
-        prior_matrix=np.diag(np.full(n, 1e4)),
-        prior_gradient=1e2 * np.array(tolerances),
-        matrix=np.zeros((len(NO_EFFECT.loss), n, n)),
-        gradient=np.zeros((len(NO_EFFECT.loss), n)),
-    )
-    return replace(trial, fitted=fitted)
-
-
-def test_of_equal_fits_the_one_that_bends_the_simulator_less_is_likelier():
-    load = bent(a_trial("viscous_friction", 1, np.full(40, 1.1)), 0.5, 0.5)
-    link = bent(a_trial("viscous_friction", 1, np.full(40, 1.1), axis=2), 4.0, 3.0)
-    found = standing([link, load])
-    assert found.best.trial is load
-    # Half of the chi-square of the prior: (16 + 9) / 2 against (0.25 + 0.25) / 2.
-    (said,) = (e for e in found.ledger if e.rule == "own_parameters")
-    assert said.hypothesis == link.label
-    assert said.nats == pytest.approx(-12.25)
-    assert found.ranked[1].probability / found.best.probability == pytest.approx(np.exp(-12.25))
-
-
-def test_what_all_of_them_bend_alike_tells_none_from_another():
-    trials = [a_trial("viscous_friction", 1, np.full(40, x), axis=k) for k, x in ((1, 1.1), (2, 4))]
-    straight, crooked = standing(trials), standing([bent(t, 3.0, 3.0) for t in trials])
-    assert [r.probability for r in crooked.ranked] == pytest.approx(
-        [r.probability for r in straight.ranked]
-    )
-    assert crooked.p_unknown == pytest.approx(straight.p_unknown)
