@@ -96,7 +96,7 @@ def _above(comments: dict[int, str], line: int) -> str:
         return comments[line]
     while line > 1 and line - 1 not in comments:
         line -= 1
-        if line < 1 or _ends(line, comments):
+        if _ends(line, comments):
             return ""
     words = []
     while line - 1 in comments:

@@ -48,11 +48,6 @@ def torque_fit(torque: Array, predicted: Array, at: Motion) -> TorqueFit:
     return TorqueFit(slope, left, turned, gain)
 
 
-def one_left(torque: Array, predicted: Array, speed: Array) -> float:
-    """Return the share of the variance of a torque (n,) left by a positive multiple of a prediction."""
-    return _one(torque, predicted, speed)[1]
-
-
 def _one(y: Array, predicted: Array, speed: Array) -> tuple[float, float, float, float]:
     power = float(((y - y.mean()) ** 2).sum())
     if not power > 0.0:
