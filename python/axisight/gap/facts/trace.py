@@ -17,6 +17,7 @@ RULES: Mapping[str, str] = MappingProxyType(
     {
         "likelihood": "How well it predicts data that were left out of its fit.",
         "cost": "What its fitted numbers cost (Schwarz 1978).",
+        "own_parameters": "It takes the simulator's own parameters further off their nominal values.",
         "formula_error": "Formulas of its kind differ by less than those of most effects.",
         "better_fit": "It fits better with no more numbers and predicts nearly as well: neither is surer.",
         "plainer_law": "What it adds to a plainer law is not there.",

@@ -15,7 +15,13 @@ from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.ranking.belief import Belief
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, are_lags
 from axisight.gap.ranking.formula_error import held_apart
-from axisight.gap.ranking.likelihood import FORMULA_ERROR, INDEPENDENT_BLOCKS, PARAMETER_COST
+from axisight.gap.ranking.likelihood import (
+    FORMULA_ERROR,
+    INDEPENDENT_BLOCKS,
+    PARAMETER_COST,
+    nats_by_loss,
+)
+from axisight.gap.ranking.own_parameters import price_of_bending
 from axisight.gap.ranking.plainer_law import held_to_plainer
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 
@@ -29,14 +35,15 @@ def stand(
     layout: Layout,
     axis: int,
     *,
+    without: FittedModel,
     explained_share: float,
 ) -> AxisPosterior | None:
     """Rank the candidates that lower the loss of ``axis`` (from 0); None if there is none.
 
-    ``current`` and ``floor`` (n_blocks,): held-out loss without the candidates and of a perfect
-    model. Likelihood ratio of the held-out error on the axis with unknown variance, formula error
-    added, one cost per fitted number. *No cause* leaves the loss what it is. *Something unknown*
-    counts as a candidate that explains ``explained_share``: one that explains less is less
+    ``current`` and ``floor`` (n_blocks,): held-out loss of the model ``without`` the candidates, and of a perfect
+    one. Likelihood ratio of the held-out error on the axis with unknown variance, formula error added, one cost
+    per fitted number, and the price of own parameters that are bent. *No cause* leaves the loss what it is.
+    *Something unknown* counts as a candidate that explains ``explained_share``: one that explains less is less
     probable than a cause nobody has thought of.
     """
     here = layout.axis == axis
@@ -55,6 +62,8 @@ def stand(
     likelihood = -0.5 * INDEPENDENT_BLOCKS * np.log(tempered)
     belief.becomes("likelihood", likelihood, against=likelihood[-2])
     belief.becomes("cost", likelihood - cost)
+    prices = _prices(mine, without, current, floor, layout)
+    belief.becomes("own_parameters", belief.log_weight - prices)
     fitted = np.array([_fitted_loss(t.fitted, here) for t in mine])
     apart = held_apart(
         [t.hypothesis for t in mine],
@@ -102,6 +111,28 @@ def _costs(trials: Sequence[FittedHypothesis]) -> Array:
         if like is not None and (like.law, axis) in places:
             out[i] = min(out[i], out[places[like.law, axis]] + float(np.log(like.rarer)))
     return out
+
+
+def _prices(
+    trials: Sequence[FittedHypothesis],
+    without: FittedModel,
+    current: Array,
+    floor: Array,
+    layout: Layout,
+) -> Array:
+    """Return what the simulator's own parameters pay in each trial, *none* and *unknown* (n_trials + 2,) [nats].
+
+    *None* is the model ``without`` any of them. *Unknown* is held against the trials by what these explain, and
+    bends nothing.
+    """
+    least = layout.by_axis(floor)
+    explainable = np.maximum(layout.by_axis(current) - least, 0.0)
+
+    def paid(fitted: FittedModel, loss: Array) -> float:
+        left = np.maximum(layout.by_axis(loss), least) + FORMULA_ERROR * explainable
+        return price_of_bending(fitted, nats_by_loss(left)[layout.axis])
+
+    return np.array([*(paid(t.fitted, t.held_out) for t in trials), paid(without, current), 0.0])
 
 
 # Half of it is a log-likelihood ratio; and fits of candidates end at a share of their loss, of which

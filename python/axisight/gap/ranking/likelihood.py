@@ -22,6 +22,14 @@ Coulomb, play or dead zone): differences in fit below it say nothing about the c
 PARAMETER_COST = 0.5 * float(np.log(INDEPENDENT_BLOCKS))
 
 
+def nats_by_loss(loss: Array) -> Array:
+    """Return how many log-likelihoods a little more loss costs, of half of a loss each [1]: one at most.
+
+    A fit has one for every half. Here ``INDEPENDENT_BLOCKS`` stand for all residuals that make up ``loss``.
+    """
+    return np.asarray(INDEPENDENT_BLOCKS / np.maximum(loss, INDEPENDENT_BLOCKS))
+
+
 def likelier(loss: float, cost: float, *, than: tuple[float, float]) -> bool:
     """Whether a held-out loss with so many fitted numbers is likelier than another."""
     gain = 0.5 * INDEPENDENT_BLOCKS * float(np.log(than[0] / loss))

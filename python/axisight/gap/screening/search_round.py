@@ -289,6 +289,7 @@ class SearchRound:
                 self.floor,
                 self.layout,
                 axis,
+                without=self.model,
                 explained_share=self.settings.explained_share,
             )
             for axis in range(self.layout.n_axes)

@@ -70,6 +70,7 @@ def one_for_several(
             floor,
             judged,
             place,
+            without=without,
             explained_share=settings.explained_share,
         )
         if standing is None:

@@ -151,6 +151,7 @@ class Pairs:
             self.floor,
             self.layout,
             axis,
+            without=base.fitted,
             explained_share=self.settings.explained_share,
         )
         if standing is None or standing.best.trial.label != one:

@@ -203,6 +203,7 @@ def _stands(
         state.floor,
         state.layout,
         axis,
+        without=without,
         explained_share=settings.explained_share,
     )
     return found is not None and found.best.probability > found.p_none + found.p_unknown

@@ -161,7 +161,13 @@ def weighed_again(
     without = must_hold(fitter.fit(rest, model, lazy=True))
     tried = [trial(fit.free[-1], fit) for fit in fits.values()]
     standing = stand(
-        tried, held_out_loss(without), floor, layout, entered.axis, explained_share=explained_share
+        tried,
+        held_out_loss(without),
+        floor,
+        layout,
+        entered.axis,
+        without=without,
+        explained_share=explained_share,
     )
     found = None if standing is None else standing.usual_first().play_first()
     if found is None or found.best.trial.label == label:

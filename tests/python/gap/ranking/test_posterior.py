@@ -34,7 +34,7 @@ ONE_AXIS = Layout(ONE_LOG, np.arange(40) // 2, ONE_LOG, np.full(40, 10))
 
 
 def standing(trials: list[FittedHypothesis], current: np.ndarray = CURRENT) -> AxisPosterior:
-    found = stand(trials, current, FLOOR, ONE_AXIS, 0, explained_share=0.6)
+    found = stand(trials, current, FLOOR, ONE_AXIS, 0, without=NO_EFFECT, explained_share=0.6)
     assert found is not None
     return found
 
@@ -110,7 +110,9 @@ def test_an_axis_is_ranked_by_its_own_loss():
     quiet = a_trial("viscous_friction", 1, np.where(layout.axis == 0, 1.0, 101.0))
     loud = a_trial("viscous_friction", 1, np.where(layout.axis == 0, 3.0, 1.0), axis=2)
     for axis, mine in enumerate((quiet, loud)):
-        found = stand([quiet, loud], current, FLOOR, layout, axis, explained_share=0.6)
+        found = stand(
+            [quiet, loud], current, FLOOR, layout, axis, without=NO_EFFECT, explained_share=0.6
+        )
         assert found is not None
         assert [r.trial for r in found.ranked] == [mine]
         assert found.best.score == pytest.approx(1.0)
@@ -220,7 +222,15 @@ def test_what_moves_several_axes_is_held_against_rivals_on_all_of_them():
 
     true, shadow, elsewhere = on_both(2, 1.1, 1.1), on_both(1, 1.1, 2.0), on_both(3, 1.1, 12.0)
     here, there = (
-        stand([true, shadow, elsewhere], current, floor, two, axis, explained_share=0.6)
+        stand(
+            [true, shadow, elsewhere],
+            current,
+            floor,
+            two,
+            axis,
+            without=both_axes,
+            explained_share=0.6,
+        )
         for axis in (0, 1)
     )
     assert here is not None and there is not None
@@ -432,3 +442,29 @@ def test_laws_of_friction_are_held_apart_where_one_leaves_hardly_more_than_noise
     assert p["asymmetric_friction"] / p["coulomb_friction"] == pytest.approx(
         (5.3 / 5.2) ** 30 / cost
     )
+
+
+def bent(trial: FittedHypothesis, *tolerances: float) -> FittedHypothesis:
+    """The same with the simulator's own parameters so many of their tolerances off, held there by the data."""
+    n, blocks = len(tolerances), len(NO_EFFECT.loss)
+    off = np.array(tolerances)
+    fitted = replace(
+        NO_EFFECT,
+        parameters=tuple((None, f"axis{i}.mass") for i in range(n)),
+        prior_matrix=np.eye(n),
+        prior_gradient=off,
+        matrix=np.tile(1e9 * np.eye(n), (blocks, 1, 1)),
+        gradient=np.tile(-off / blocks, (blocks, 1)),
+    )
+    return replace(trial, fitted=fitted)
+
+
+def test_of_equal_fits_the_one_that_bends_the_simulator_less_is_likelier():
+    load = bent(a_trial("viscous_friction", 1, np.full(40, 1.1)), 0.5, 0.5)
+    link = bent(a_trial("viscous_friction", 1, np.full(40, 1.1), axis=2), 4.0, 3.0)
+    found = standing([link, load])
+    assert found.best.trial is load
+    # Half of the chi-square of the prior: (16 + 9) / 2 against (0.25 + 0.25) / 2.
+    said = {e.hypothesis: e.nats for e in found.ledger if e.rule == "own_parameters"}
+    assert said == pytest.approx({link.label: -12.5, load.label: -0.25})
+    assert found.ranked[1].probability / found.best.probability == pytest.approx(np.exp(-12.25))

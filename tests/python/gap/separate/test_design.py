@@ -31,8 +31,8 @@ def one_way(seed: int, n: int, sample_time_s: float) -> np.ndarray:
     return (np.minimum(time / 0.1, 1.0) * (10.0 + 2.0 * wave / np.abs(wave).max()))[:, None]
 
 
-FRICTION = Effect("coulomb_friction", 1, {"coulomb_nm": 0.025, "smoothing_rad_s": 0.1})
-OFFSET = Effect("torque_offset", 1, {"offset_nm": -0.025})
+FRICTION = Effect("coulomb_friction", 1, {"coulomb_nm": 0.02, "smoothing_rad_s": 0.1})
+OFFSET = Effect("torque_offset", 1, {"offset_nm": -0.02})
 MACHINE = scattered(bare_axis(), 4)
 
 
