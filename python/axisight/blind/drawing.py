@@ -97,15 +97,8 @@ DRAWN = Choice()
 
 def draw(seed: int, number: int, choice: Choice = DRAWN, attempt: int = 0) -> Draw:
     """Return case ``number`` of a benchmark; another one at every further ``attempt``."""
-    rng = np.random.default_rng([seed, number, attempt] if attempt else [seed, number])
-    engine, arm, motions = (
-        chosen or drawn
-        for chosen, drawn in zip(
-            (choice.engine, choice.arm, choice.motions),
-            (_one_of(rng, shares) for shares in (_ENGINES, _ARMS, _MOTIONS)),
-            strict=True,
-        )
-    )
+    rng = _chance(seed, number, attempt)
+    engine, arm, motions = _circumstances(rng, choice)
     robot = load_robot(arm)
     references = MOTIONS[motions](rng, robot)
     scene = Scene(robot, [reference for _, reference in references.values()])
@@ -131,6 +124,20 @@ def draw(seed: int, number: int, choice: Choice = DRAWN, attempt: int = 0) -> Dr
         referenced,
         bits,
     )
+
+
+def circumstances(seed: int, number: int, choice: Choice = DRAWN) -> tuple[str, str, str]:
+    """Return the engine, the arm and the motions of case ``number``, as its first attempt has them."""
+    return _circumstances(_chance(seed, number, 0), choice)
+
+
+def _chance(seed: int, number: int, attempt: int) -> np.random.Generator:
+    return np.random.default_rng([seed, number, attempt] if attempt else [seed, number])
+
+
+def _circumstances(rng: np.random.Generator, choice: Choice) -> tuple[str, str, str]:
+    engine, arm, motions = (_one_of(rng, shares) for shares in (_ENGINES, _ARMS, _MOTIONS))
+    return choice.engine or engine, choice.arm or arm, choice.motions or motions
 
 
 def _one_of(rng: np.random.Generator, shares: Mapping[str, float]) -> str:

@@ -23,7 +23,7 @@ from axisight.blind import (
     pinocchio_engine,
 )
 from axisight.blind.case_files import CaseFolder
-from axisight.blind.drawing import ENGINES, Choice, draw, machine_of, scattered
+from axisight.blind.drawing import ENGINES, Choice, circumstances, draw, machine_of, scattered
 from axisight.blind.formulas import (
     ConstantTorque,
     DelayLine,
@@ -239,7 +239,7 @@ def test_a_case_is_a_function_of_seed_and_number():
 
 
 def test_some_logs_have_no_references_and_some_torques_steps(tmp_path: Path):
-    drawn = [draw(0, n) for n in range(32)]
+    drawn = [draw(0, n, Choice(arm="lever_like", motions="slow_and_short")) for n in range(32)]
     bare = [d for d in drawn if not d.referenced]
     assert 0 < len(bare) < 16
     assert not {e.effect for d in bare for e in d.effects} & {"controller_gain", "clock_drift"}
@@ -272,10 +272,14 @@ def test_noise_of_some_sensors_is_coloured_and_as_large():
 
 
 def test_engines_arms_and_motions_are_drawn_unless_they_are_chosen():
-    drawn = [draw(2, number) for number in range(60)]
-    assert {d.engine for d in drawn} == set(ENGINES)
-    assert {d.motions for d in drawn} == set(MOTIONS)
-    assert {d.arm for d in drawn} == {"irb6600_like", "scara_like", "lever_like", "cobot_like"}
+    engines, arms, motions = map(set, zip(*(circumstances(2, n) for n in range(60)), strict=True))
+    assert engines == set(ENGINES)
+    assert motions == set(MOTIONS)
+    assert arms == {"irb6600_like", "scara_like", "lever_like", "cobot_like"}
+    one = draw(2, 3)
+    assert (one.engine, one.arm, one.motions) == circumstances(2, 3)
+    chosen = Choice(arm="lever_like")
+    assert circumstances(2, 3, chosen) == (one.engine, "lever_like", one.motions)
     with pytest.raises(InputError, match="arm: expected one of irb6600_like, "):
         Choice(arm="nothing")
 
