@@ -28,7 +28,6 @@ RULES: Mapping[str, str] = MappingProxyType(
         "rival_leads": "A rival of the same axis explains another axis for certain.",
         "composite": "A composite and its part are one hypothesis: the part has the probability of both.",
         "simplest_first": "It explains as much with less: it is named first.",
-        "straighter_first": "It bends the simulator's own parameters less: it is named first.",
         "reported_torque": "The controller's gains ask for this torque constant.",
         "beside_causes": "Other causes of the model are no rivals of it.",
         "either": "Another cause does the same to the logs, and is as likely.",
@@ -40,11 +39,9 @@ RULES: Mapping[str, str] = MappingProxyType(
 MOVES: Mapping[str, str] = MappingProxyType(
     {
         "add": "Took in what leads an axis and is a cause there.",
-        "drop": "Dropped a cause that the others had made needless.",
-        "stand_in": "Dropped a cause that stood in for an effect of the whole arm.",
+        "drop": "Dropped a cause that the others had made needless, or that stood in for an effect of the whole arm.",
         "merge": "Put one effect in the place of several that it does as well as.",
-        "exchange": "Put a rival in the place of a cause that was judged beside other causes.",
-        "straighten": "Put a rival in the place of a cause that bends the simulator.",
+        "exchange": "Put a rival in the place of a cause that was judged beside other causes, or bends the simulator.",
         "withdraw": "Took out causes that something unknown is likelier than.",
         "finish": "Fitted on where a step still promised more than noise.",
         "reported_torque": "Put in the torque constant that the controller's gains ask for.",

@@ -38,6 +38,10 @@ class Layout:
         """Number of axes."""
         return int(self.axis.max()) + 1
 
+    def of(self, axis: int | None) -> NDArray[np.bool_]:
+        """Return which blocks (n_blocks,) are of an axis (from 0); all where that is None."""
+        return np.ones(len(self.axis), dtype=bool) if axis is None else self.axis == axis
+
     def by_axis(self, values: Array) -> Array:
         """Return the sum (n_axes,) of values by block (n_blocks,)."""
         return np.asarray(np.bincount(self.axis, values, minlength=self.n_axes), np.float64)

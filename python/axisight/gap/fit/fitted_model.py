@@ -153,6 +153,27 @@ class FittedModel(NormalEquations):
             columns={key: column.part(rows) for key, column in self.columns.items()},
         )
 
+    def ending_with(self, last: Hypothesis) -> FittedModel:
+        """Return the same with one of its effects last: what is under trial stands there."""
+        at = next(i for i, f in enumerate(self.free) if f.effect.label == last.effect.label)
+        order = [i for i in range(len(self.free)) if i != at] + [at]
+        place = {old: new for new, old in enumerate(order)}
+
+        def renamed(key: tuple[int | None, str]) -> tuple[int | None, str]:
+            return None if key[0] is None else place[key[0]], key[1]
+
+        balanced = self.balanced
+        return replace(
+            self,
+            effects=tuple(self.effects[i] for i in order),
+            free=tuple(self.free[i] for i in order),
+            parameters=tuple(map(renamed, self.parameters)),
+            at_bound=tuple(map(renamed, self.at_bound)),
+            balanced=None if balanced is None else tuple(map(renamed, balanced)),
+            std={renamed(key): value for key, value in self.std.items()},
+            room={renamed(key): value for key, value in self.room.items()},
+        )
+
     @property
     def converged(self) -> bool:
         """Whether the fit ended where no step lowers the loss further."""

@@ -32,23 +32,24 @@ def numbers(effect: Hypothesis) -> float:
 class FittedHypothesis:
     """A candidate fitted on top of a model: its held-out loss by block, (n_blocks,).
 
-    ``idle``: numbers of it that it does not need.
+    ``idle``: numbers of it that it does not need; ``also``: effects that are under trial together with it.
     """
 
     hypothesis: Hypothesis
     fitted: FittedModel
     held_out: Array
     idle: float = 0.0
+    also: tuple[Hypothesis, ...] = ()
 
     @property
     def label(self) -> str:
-        """``effect@axis``."""
-        return self.hypothesis.effect.label
+        """``effect@axis``, of several with a plus between them."""
+        return " + ".join(h.effect.label for h in (*self.also, self.hypothesis))
 
     @property
     def cost(self) -> float:
         """Number of fitted values that it needs; the order of a harmonic counts too."""
-        return numbers(self.hypothesis) - self.idle
+        return sum(map(numbers, (*self.also, self.hypothesis))) - self.idle
 
 
 def trial(

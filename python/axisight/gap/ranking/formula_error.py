@@ -32,7 +32,7 @@ _ROUNDING = 1e-9
 
 def held_apart(
     candidates: Sequence[Hypothesis],
-    axis: int,
+    axis: int | None,
     logp: Array,
     losses: Array,
     explainable: float,
@@ -41,8 +41,8 @@ def held_apart(
 ) -> Array:
     """Return log-probabilities with candidates of one kind held against one another by little.
 
-    Those of ``axis`` (from 0), by what they leave there; of weights those of the arm, too. Together they are
-    as probable as they were. On other axes they leave what the rest of the model does. ``losses``: as
+    Those of ``axis`` (from 0; None: of all), by what they leave there; of weights those of the arm, too. Together
+    they are as probable as they were. On other axes they leave what the rest of the model does. ``losses``: as
     predicted, less than ``least`` by chance; ``likelihood`` of what some of them leave, logarithmic.
     """
     out = logp.copy()
@@ -55,7 +55,11 @@ def held_apart(
 
 
 def _kinds(
-    candidates: Sequence[Hypothesis], axis: int, losses: Array, explainable: float, least: float
+    candidates: Sequence[Hypothesis],
+    axis: int | None,
+    losses: Array,
+    explainable: float,
+    least: float,
 ) -> Iterator[tuple[Members, float, float]]:
     """Yield which are of one kind, what the right one of them may leave, and how many times as much it counts.
 
@@ -63,7 +67,7 @@ def _kinds(
     """
     effects = [c.effect for c in candidates]
     formulas = [effect_info(e.name).formula for e in effects]
-    here = np.array([e.axis in (axis + 1, None) for e in effects], dtype=bool)
+    here = np.array([axis is None or e.axis in (axis + 1, None) for e in effects], dtype=bool)
     always = np.array([f.held == "always" for f in formulas], dtype=bool)
     little = {
         "always": np.inf,

@@ -12,6 +12,7 @@ from axisight.gap.facts.trace import NONE, UNKNOWN
 from axisight.gap.fit.amplitude_significance import amplitude_significance
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel
+from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.ranking.belief import Belief
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, are_lags
 from axisight.gap.ranking.formula_error import held_apart
@@ -23,7 +24,7 @@ from axisight.gap.ranking.likelihood import (
 )
 from axisight.gap.ranking.own_parameters import price_of_bending
 from axisight.gap.ranking.plainer_law import held_to_plainer
-from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
+from axisight.gap.ranking.posterior import TINY, AxisPosterior, RankedHypothesis
 
 Array = NDArray[np.float64]
 
@@ -33,12 +34,12 @@ def stand(
     current: Array,
     floor: Array,
     layout: Layout,
-    axis: int,
+    axis: int | None,
     *,
     without: FittedModel,
     explained_share: float,
 ) -> AxisPosterior | None:
-    """Rank the candidates that lower the loss of ``axis`` (from 0); None if there is none.
+    """Rank the candidates that lower the loss of ``axis`` (from 0; None: of all together); None if there is none.
 
     ``current`` and ``floor`` (n_blocks,): held-out loss of the model ``without`` the candidates, and of a perfect
     one. Likelihood ratio of the held-out error on the axis with unknown variance, formula error added, one cost
@@ -46,7 +47,7 @@ def stand(
     *Something unknown* counts as a candidate that explains ``explained_share``: one that explains less is less
     probable than a cause nobody has thought of.
     """
-    here = layout.axis == axis
+    here = layout.of(axis)
     before, least = float(current[here].sum()), float(floor[here].sum())
     explainable = max(before - least, 1e-12)
     mine = [t for t in trials if t.held_out[here].sum() < before]
@@ -82,7 +83,7 @@ def stand(
     plainer = held_to_plainer(tried, [t.fitted for t in mine], belief.log_weight, layout.stretch)
     belief.becomes("plainer_law", plainer)
     probability = belief.probabilities()
-    samples = float(layout.samples()[axis])
+    samples = float(layout.counted[here].sum())
     ranked = [
         RankedHypothesis(
             t,
@@ -93,9 +94,20 @@ def stand(
         )
         for t, loss, p in zip(mine, losses, probability, strict=False)
     ]
-    ranked.sort(key=lambda r: (-r.probability, -r.score, r.trial.label))
+    ranked.sort(key=lambda r: _order(r, axis))
     none, unknown = (float(p) for p in probability[-2:])
-    return AxisPosterior(axis, tuple(ranked), none, unknown, tuple(belief.ledger))
+    return AxisPosterior(axis or 0, tuple(ranked), none, unknown, tuple(belief.ledger))
+
+
+# Nats within which two hypotheses are as likely: less than fits leave open.
+_AS_LIKELY = 0.01
+
+
+def _order(one: RankedHypothesis, axis: int | None) -> tuple[float, bool, float, str]:
+    """Return by what hypotheses are in order: of those as likely, what acts on this axis alone comes first."""
+    nats = np.log(max(one.probability, TINY))
+    elsewhere = axis is not None and one.trial.hypothesis.effect.axis != axis + 1
+    return -float(np.round(nats / _AS_LIKELY)), elsewhere, -one.score, one.trial.label
 
 
 def _costs(trials: Sequence[FittedHypothesis]) -> Array:
@@ -133,6 +145,28 @@ def _prices(
         return price_of_bending(fitted, nats_by_loss(left)[layout.axis])
 
     return np.array([*(paid(t.fitted, t.held_out) for t in trials), paid(without, current), 0.0])
+
+
+def set_likelier(
+    one: FittedHypothesis,
+    several: FittedHypothesis,
+    without: FittedModel,
+    floor: Array,
+    layout: Layout,
+    axis: int | None,
+) -> bool:
+    """Whether one effect is likelier than several in its place, by likelihood, cost and own parameters.
+
+    On ``axis`` (from 0; None: on all together). What a further effect takes away is no error of a formula: none is
+    added. Which effect it is costs as a number does. ``floor`` (n_blocks,): below it nothing counts.
+    """
+    here = layout.of(axis)
+    both = [one, several]
+    left = np.array([max(t.held_out[here].sum(), floor[here].sum()) for t in both])
+    cost = PARAMETER_COST * np.array([t.cost + 1 + len(t.also) for t in both])
+    price = _prices(both, without, held_out_loss(without), floor, layout)[:2]
+    weight = -0.5 * INDEPENDENT_BLOCKS * np.log(left) - cost - price
+    return bool(weight[0] > weight[1])
 
 
 # Half of it is a log-likelihood ratio; and fits of candidates end at a share of their loss, of which
@@ -178,7 +212,7 @@ def _with_those_that_fit_better(
 
 
 def _significance(
-    t: FittedHypothesis, current: Array, layout: Layout, axis: int, *, explains: bool
+    t: FittedHypothesis, current: Array, layout: Layout, axis: int | None, *, explains: bool
 ) -> float:
     """Return how sure a trial is on an axis: by its gain, or by its size.
 
@@ -186,5 +220,5 @@ def _significance(
     of it has a size too, whatever the cause is.
     """
     gain = layout.significance(current, t.held_out, axis)
-    own = t.hypothesis.effect.acts_on(axis + 1)
+    own = axis is None or t.hypothesis.effect.acts_on(axis + 1)
     return max(gain, amplitude_significance(t.fitted, layout.stretch)) if own and explains else gain

@@ -1,68 +1,116 @@
 """The moves that judge causes anew: which there are, in which order, and where each makes sense.
 
-A new one is a function that changes a state by `SearchState.moved`, an entry here, and its name with what it
-does in `axisight.gap.facts.trace.MOVES`.
+A new one is a function that proposes other sets of causes, an entry here, and its name with what it does in
+`axisight.gap.facts.trace.MOVES`. Whether a set is taken is decided in `axisight.gap.search.contest` alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from axisight.gap.facts.settings import Settings
-from axisight.gap.fit.fitted_model import Hypothesis
+from axisight.fitting.divergence import Diverged, must_hold
+from axisight.gap.fit.held_out import linear_gain
 from axisight.gap.fit.model_fitter import ModelFitter
-from axisight.gap.search.revision import (
-    drop_idle,
-    finish,
-    merge,
-    straighten,
-    weigh_again,
-    withdraw_doubtful,
-)
-from axisight.gap.search.state import SearchState
-
-
-@dataclass(frozen=True)
-class Context:
-    """What a move works with: the fitter, the state that it changes, and the hypotheses ``offered``."""
-
-    fitter: ModelFitter
-    state: SearchState
-    settings: Settings
-    offered: Sequence[Hypothesis] = ()
+from axisight.gap.fit.settling import settled
+from axisight.gap.ranking.posterior import AxisPosterior
+from axisight.gap.search.contest import Context, Decision, Proposal, decided
+from axisight.gap.search.needless import doubtful, needless
+from axisight.gap.search.one_for_several import merged
+from axisight.gap.search.rivals import exchanged
+from axisight.gap.search.state import OPEN, Round, SearchState
 
 
 @dataclass(frozen=True)
 class Move:
-    """A move: what it is called, and what it does to the state of a context.
+    """A move: what it is called, and which sets it proposes in a context.
 
-    ``in_loops_only``: it makes sense where the errors of axes do not add up, in a closed loop.
+    ``in_loops_only``: it makes sense where the errors of axes do not add up, in a closed loop. ``then``: moves that
+    follow where it changed something.
     """
 
     name: str
-    run: Callable[[Context], object]
+    proposals: Callable[[Context], Iterator[Proposal]]
     in_loops_only: bool = False
+    then: tuple[Move, ...] = ()
 
 
-AFTER_EACH_ROUND = (
-    Move("drop", lambda c: drop_idle(c.fitter, c.state, c.settings)),
-    Move("merge", lambda c: merge(c.fitter, c.state, c.settings, c.offered)),
-)
+DROP = Move("drop", needless)
+AFTER_EACH_ROUND = (DROP, Move("merge", merged))
 AT_THE_END = (
-    Move("exchange", lambda c: weigh_again(c.fitter, c.state, c.settings), in_loops_only=True),
-    Move("straighten", lambda c: straighten(c.fitter, c.state)),
-    Move(
-        "withdraw", lambda c: withdraw_doubtful(c.fitter, c.state, c.settings), in_loops_only=True
-    ),
-    Move("finish", lambda c: finish(c.fitter, c.state)),
+    Move("exchange", exchanged, in_loops_only=True, then=(DROP,)),
+    Move("withdraw", doubtful, in_loops_only=True),
 )
 
 
 def make(moves: Sequence[Move], context: Context) -> set[str]:
-    """Make moves in order; return the labels of the causes that they took out."""
+    """Make moves in order, each as long as one of its sets is taken; return the labels of causes that went out."""
     before = {f.effect.label for f in context.state.model.free}
     for move in moves:
-        if not (move.in_loops_only and context.fitter.adds_up):
-            move.run(context)
+        if move.in_loops_only and context.fitter.adds_up:
+            continue
+        tried: set[tuple[frozenset[str], frozenset[str]]] = set()
+        changed = False
+        while _made(move, context, tried):
+            changed = True
+        if changed:
+            make(move.then, context)
     return before - {f.effect.label for f in context.state.model.free}
+
+
+def _made(move: Move, context: Context, tried: set[tuple[frozenset[str], frozenset[str]]]) -> bool:
+    """Take the first set of a move that is likelier than what there is; return whether there is one."""
+    labels = frozenset(f.effect.label for f in context.state.model.free)
+    for proposal in move.proposals(context):
+        # The same causes beside the same others were judged before.
+        key = labels - proposal.labels, proposal.labels
+        if key in tried:
+            continue
+        tried.add(key)
+        decision = decided(context, proposal)
+        if decision is not None:
+            _take(move.name, context, proposal, decision)
+            return True
+    return False
+
+
+def _take(name: str, context: Context, proposal: Proposal, decision: Decision) -> None:
+    """Take a set of causes into the state, fitted until it settles, with how what is new in it stood."""
+    state, standing = context.state, decision.standing
+    left = state.left()
+    if standing is not None and proposal.as_entered:
+        standing = _as_entered(state, proposal, standing)
+    model = decision.model
+    state.moved(name, must_hold(settled(context.fitter, model.free, model)))
+    if standing is not None:
+        state.rounds.append(Round((standing,), ((standing.best, standing),), left))
+
+
+def _as_entered(state: SearchState, proposal: Proposal, standing: AxisPosterior) -> AxisPosterior:
+    """Return what takes the place of a cause as it stood beside that; there it had all its rivals."""
+    label = standing.best.trial.label
+    for cause, entered in state.accepted:
+        if cause.trial.label in proposal.labels:
+            same = (r for r in entered.inseparable() if r.trial.label == label)
+            return next((entered.led_by(r) for r in same), standing)
+    return standing
+
+
+# Steps of the last fit.
+_FINISHING = 12
+
+
+def finish(fitter: ModelFitter, state: SearchState) -> None:
+    """Fit on where a step still promises more than noise leaves open.
+
+    A share of a large loss, at which fits end, may be many standard deviations along a flat valley, such
+    as that of a load and the mass of the link that carries it.
+    """
+    model = state.model
+    if not model.free or model.stuck or linear_gain(model) < OPEN:
+        return
+    found = fitter.fit(
+        model.free, model, lazy=True, max_iterations=_FINISHING, refreshes=1, worth=OPEN
+    )
+    if not isinstance(found, Diverged):
+        state.moved("finish", found)

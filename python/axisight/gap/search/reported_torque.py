@@ -10,15 +10,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from axisight.fitting.divergence import must_hold
+from axisight.fitting.divergence import Diverged, must_hold
 from axisight.gap.controller.torque_sensor import Asked, asked_of_motion
 from axisight.gap.facts.algebraic_cause import AlgebraicCause
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.fit.settling import settled
 from axisight.gap.ranking.likelihood import clearly_worse
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
+from axisight.gap.screening.screening import kept_beside
 from axisight.gap.search.state import Round, SearchState
-from axisight.gap.search.swap import in_its_place
 
 # Errors of torque constants range over a tenth either way. One that a share of the controller's asks for
 # may be off by a hundredth: by chance a rival is that in a tenth of cases, for a torque that is reported
@@ -42,7 +43,7 @@ def with_constants_told(
         rival = _told(standing, told)
         if rival is None:
             continue
-        model = in_its_place(fitter, found.model, cause, rival)
+        model = _in_its_place(fitter, found.model, cause, rival)
         if model is None or clearly_worse(model.total, found.model.total):
             continue
         model = _held(fitter, model, rival.trial.label, told)
@@ -62,6 +63,20 @@ def _told(standing: AxisPosterior, told: Mapping[str, Asked]) -> RankedHypothesi
         if asked is not None and asked.off(one.trial.fitted.effects[-1]) < _OFF:
             return one
     return None
+
+
+def _in_its_place(
+    fitter: ModelFitter, model: FittedModel, cause: RankedHypothesis, rival: RankedHypothesis
+) -> FittedModel | None:
+    """Return a model with a rival in the place of one of its causes; None where it cannot be simulated."""
+    new = rival.trial.fitted.free[-1]
+    others = [f for f in model.free if f.effect.label != cause.trial.label]
+    free = [*kept_beside(others, new), new]
+    alone = len(free) == len(rival.trial.fitted.free)
+    found = fitter.fit(free, rival.trial.fitted if alone else model, refreshes=1)
+    if not isinstance(found, Diverged):
+        found = settled(fitter, found.free, found)
+    return None if isinstance(found, Diverged) else found
 
 
 def _held(

@@ -23,7 +23,8 @@ from axisight.gap.screening.column_cache import ColumnCache
 from axisight.gap.screening.promise import HOPELESS
 from axisight.gap.screening.screening import kept_beside
 from axisight.gap.screening.search_round import Progress, SearchRound, fresh, interact
-from axisight.gap.search.moves import AFTER_EACH_ROUND, AT_THE_END, Context, make
+from axisight.gap.search.contest import Context
+from axisight.gap.search.moves import AFTER_EACH_ROUND, AT_THE_END, finish, make
 from axisight.gap.search.pairs import Pairs, in_parts, without_rival_composites
 from axisight.gap.search.state import OPEN, Round, SearchState
 from axisight.statistics.tails import normal_deviate
@@ -96,6 +97,7 @@ def search(
         if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
             break
     make(AT_THE_END, Context(fitter, out, settings))
+    finish(fitter, out)
     return out
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import Effect, effect_info
 from axisight.gap.facts.settings import Settings
 from axisight.gap.facts.trace import Step
 from axisight.gap.fit.data_blocks import Layout
@@ -16,7 +17,6 @@ from axisight.gap.fit.sensitivity import Sensitivity
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.likelihood import FORMULA_ERROR
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
-from axisight.gap.search.swap import alike
 
 Array = NDArray[np.float64]
 
@@ -125,3 +125,9 @@ class SearchState:
         """Return the share of the explainable held-out error the model removes."""
         total = float(self.to_explain().sum())
         return float(self.removed().sum()) / total if total > 0 else 0.0
+
+
+def alike(one: Effect, other: Effect) -> bool:
+    """Whether two effects are laws of one gear, or of one dry friction."""
+    law = effect_info(one.name).law_of
+    return law is not None and law == effect_info(other.name).law_of

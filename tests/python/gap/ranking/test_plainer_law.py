@@ -11,7 +11,7 @@ from axisight.gap.facts.simulator_variant import AS_GIVEN
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.hypotheses.candidates import on_the_motor, one_sided
 from axisight.gap.ranking.plainer_law import held_to_plainer
-from axisight.gap.search.swap import alike
+from axisight.gap.search.state import alike
 from axisight.gap.simulator.rigid_torque import predicted_torque
 from axisight.robot import load_robot
 from gap_data import bare_axis

@@ -1,16 +1,25 @@
-"""The moves of the search: made in order, where they make sense, each by a name that says what it does."""
+"""The moves of the search: made in order, where they make sense, as long as one of their sets is taken."""
 
+from collections.abc import Iterator
 from types import SimpleNamespace
 
 import pytest
 
+from axisight import Effect
 from axisight.gap import Settings
 from axisight.gap.facts.trace import MOVES
-from axisight.gap.search.moves import AFTER_EACH_ROUND, AT_THE_END, Context, Move, make
+from axisight.gap.fit.fitted_model import Hypothesis
+from axisight.gap.search import moves
+from axisight.gap.search.contest import Context, Decision, Proposal
+from axisight.gap.search.moves import AFTER_EACH_ROUND, AT_THE_END, Move, make
+from gap_data import StateStub
 
 
-def labelled(*labels: str) -> SimpleNamespace:
-    return SimpleNamespace(free=[SimpleNamespace(effect=SimpleNamespace(label=x)) for x in labels])
+def cause(name: str) -> Hypothesis:
+    return Hypothesis(Effect(name, 1), ())
+
+
+PLAY, DRAG, OFFSET = map(cause, ("backlash", "quadratic_drag", "torque_offset"))
 
 
 def test_every_move_has_a_name_and_a_sentence():
@@ -19,16 +28,63 @@ def test_every_move_has_a_name_and_a_sentence():
     assert set(names) <= MOVES.keys()
 
 
-@pytest.mark.parametrize(("adds_up", "made"), [(False, ["a", "b"]), (True, ["b"])])
-def test_moves_are_made_in_order_where_they_make_sense(adds_up: bool, made: list[str]):
-    done: list[str] = []
-    state = SimpleNamespace(model=labelled("backlash@1", "payload"))
+class Search:
+    """A search of which sets without some effects are likelier; ``asked`` has what was decided."""
 
-    def dropped(context: Context) -> None:
-        done.append("b")
-        context.state.model = labelled("payload")
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, out: set[str], *, adds_up: bool = False):
+        self.asked: list[str] = []
+        self.state = StateStub(
+            model=SimpleNamespace(free=[PLAY, DRAG, OFFSET]), left=lambda: None, rounds=[]
+        )
+        self.context = Context(SimpleNamespace(adds_up=adds_up), self.state, Settings())  # type: ignore[arg-type]
 
-    moves = [Move("a", lambda _: done.append("a"), in_loops_only=True), Move("b", dropped)]
-    context = Context(SimpleNamespace(adds_up=adds_up), state, Settings())
-    assert make(moves, context) == {"backlash@1"}
-    assert done == made
+        def decided(context: Context, proposal: Proposal) -> Decision | None:
+            (label,) = proposal.labels
+            self.asked.append(label)
+            rest = [f for f in context.state.model.free if f.effect.label != label]
+            return Decision(SimpleNamespace(free=rest), None) if label in out else None  # type: ignore[arg-type]
+
+        monkeypatch.setattr(moves, "decided", decided)
+        monkeypatch.setattr(moves, "settled", lambda _fitter, _free, model: model)
+
+
+def each(context: Context) -> Iterator[Proposal]:
+    for f in context.state.model.free:
+        yield Proposal(0, (f,), or_none="needless")
+
+
+def test_a_move_is_made_again_as_long_as_one_of_its_sets_is_taken(monkeypatch):
+    found = Search(monkeypatch, {"backlash@1", "torque_offset@1"})
+    assert make([Move("drop", each)], found.context) == {"backlash@1", "torque_offset@1"}
+    assert [f.effect.label for f in found.state.model.free] == ["quadratic_drag@1"]
+
+
+def test_the_same_set_is_judged_once_beside_the_same_others(monkeypatch):
+    found = Search(monkeypatch, set())
+
+    def twice(context: Context) -> Iterator[Proposal]:
+        yield from each(context)
+        yield from each(context)
+
+    assert make([Move("drop", twice)], found.context) == set()
+    assert found.asked == ["backlash@1", "quadratic_drag@1", "torque_offset@1"]
+
+
+@pytest.mark.parametrize(("adds_up", "made"), [(False, 3), (True, 0)])
+def test_moves_of_loops_are_made_in_loops_only(adds_up: bool, made: int, monkeypatch):
+    found = Search(monkeypatch, set(), adds_up=adds_up)
+    make([Move("drop", each, in_loops_only=True)], found.context)
+    assert len(found.asked) == made
+
+
+@pytest.mark.parametrize("out", [set(), {"backlash@1"}])
+def test_what_follows_a_move_is_made_where_that_changed_something(out: set[str], monkeypatch):
+    found = Search(monkeypatch, out)
+    followed: list[int] = []
+
+    def after(context: Context) -> Iterator[Proposal]:
+        followed.append(len(context.state.model.free))
+        return iter(())
+
+    make([Move("exchange", each, then=(Move("drop", after),))], found.context)
+    assert followed == ([2] if out else [])

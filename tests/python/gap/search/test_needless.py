@@ -1,5 +1,6 @@
-"""Causes that others have made needless are dropped, and none that a simulation cannot do without."""
+"""Which causes are put in question: those that the others make needless, and those that came in as doubtful."""
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,8 +9,10 @@ import pytest
 from axisight import Effect, Settings
 from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import Hypothesis
-from axisight.gap.search import revision
-from gap_data import StateStub, linear_evidence
+from axisight.gap.search import needless as module
+from axisight.gap.search.contest import Context
+from axisight.gap.search.needless import doubtful, needless
+from gap_data import linear_evidence
 
 COLUMNS = {"viscous_friction": 0, "torque_offset": 1, "quadratic_drag": 2}
 
@@ -33,51 +36,78 @@ class Fits:
         return SimpleNamespace(**vars(found) | {"free": free, "total": float(found.loss.sum())})
 
 
+def in_question(fitter: object, model: object, samples: Sequence[float]) -> list[str]:
+    layout = SimpleNamespace(samples=lambda: np.array(samples))
+    state = SimpleNamespace(model=model, layout=layout)
+    here = Context(fitter, state, Settings(smallest_gain=0.01))  # type: ignore[arg-type]
+    proposals = list(needless(here))
+    assert all(p.or_none == "needless" and p.instead == () for p in proposals)
+    return [f.effect.label for p in proposals for f in p.gone]
+
+
 @pytest.mark.parametrize(
-    ("needed", "dropped"), [(None, {"quadratic_drag@1"}), ("quadratic_drag", set())]
+    ("needed", "asked"), [(None, ["quadratic_drag@1"]), ("quadratic_drag", [])]
 )
-def test_a_cause_is_dropped_unless_a_loop_swings_without_it(needed, dropped, monkeypatch):
+def test_the_cause_that_takes_away_least_is_in_question_unless_a_loop_swings_without_it(
+    needed, asked, monkeypatch
+):
     fits = Fits(needed)
     free = [Hypothesis(Effect(name, 1), ("size",)) for name in COLUMNS]
     model = fits.evaluate(free, None, robot_values={})
-    state = StateStub(model=model, layout=SimpleNamespace(samples=lambda: np.array([400.0])))
-    monkeypatch.setattr(revision, "linear_gain", lambda _: 0.0)
-    monkeypatch.setattr(
-        revision, "settled", lambda fitter, rest, _: fitter.evaluate(rest, None, robot_values={})
-    )
+    monkeypatch.setattr(module, "linear_gain", lambda _: 0.0)
     # Of noise of one a per cent is worth a cause: one by chance takes a four-hundredth.
-    assert revision.drop_idle(fits, state, Settings(smallest_gain=0.01)) == dropped
+    assert in_question(fits, model, [400.0]) == asked
 
 
-@pytest.mark.parametrize(("left", "dropped"), [(100.5, {"link_com@2"}), (200.0, set())])
-def test_what_stood_in_for_a_load_is_fitted_away_however_far_a_step_goes(
-    left: float, dropped: set[str], monkeypatch
-):
-    """One step from a load that lies elsewhere promises nothing; a fit may leave no more than both did."""
+def test_what_may_stand_in_for_a_load_is_in_question_however_far_a_step_goes(monkeypatch):
     free = [
         Hypothesis(Effect("link_com", 2), ("x_m",)),
         Hypothesis(Effect("payload", None), ("mass_kg",)),
         Hypothesis(Effect("viscous_friction", 1), ("viscous_nm_s_rad",)),
     ]
-    state = StateStub(
-        model=SimpleNamespace(free=free, total=100.0, robot_values={}),
-        layout=SimpleNamespace(samples=lambda: np.array([400.0, 400.0])),
-    )
-
-    class Steps:
-        def evaluate(self, free, start, *, robot_values):
-            del free, start, robot_values
-            return SimpleNamespace(total=1000.0)
-
-    tried = []
-
-    def fitted(_, rest, start):
-        del start
-        tried.append([f.effect.label for f in rest])
-        return SimpleNamespace(free=rest, total=left, robot_values={})
-
-    monkeypatch.setattr(revision, "linear_gain", lambda _: 0.0)
-    monkeypatch.setattr(revision, "settled", fitted)
-    assert revision.drop_idle(Steps(), state, Settings(smallest_gain=0.01)) == dropped
+    model = SimpleNamespace(free=free, total=100.0, robot_values={})
+    fitter = SimpleNamespace(evaluate=lambda *_, **__: SimpleNamespace(total=1000.0))
+    monkeypatch.setattr(module, "linear_gain", lambda _: 0.0)
     # Friction stands in for no load.
-    assert tried == [["payload", "viscous_friction@1"]]
+    assert in_question(fitter, model, [400.0, 400.0]) == ["link_com@2"]
+
+
+def test_a_single_cause_is_not_needless():
+    only = SimpleNamespace(free=[Hypothesis(Effect("link_com", 2), ("x_m",))])
+    assert in_question(None, only, [400.0, 400.0]) == []
+
+
+def entered(label: str, axis: int, p: float, unknown: float, beside: Sequence[str] = ()):
+    fitted = SimpleNamespace(free=[named(x) for x in (*beside, label)])
+    ranked = SimpleNamespace(trial=SimpleNamespace(label=label, fitted=fitted), probability=p)
+    return ranked, SimpleNamespace(axis=axis, p_unknown=unknown)
+
+
+def named(label: str) -> Hypothesis:
+    name, _, axis = label.partition("@")
+    return Hypothesis(Effect(name, int(axis)), ())
+
+
+@pytest.mark.parametrize(
+    ("p", "unknown", "beside", "asked"),
+    [
+        (0.95, 0.02, (), []),
+        # Something unknown was likelier.
+        (0.04, 0.9, (), ["torque_constant@1"]),
+        # It came in beside a cause that is no longer there.
+        (0.95, 0.02, ("link_com@1",), ["torque_constant@1"]),
+        (0.95, 0.02, ("backlash@2",), []),
+    ],
+)
+def test_causes_are_doubtful_as_they_came_in(
+    p: float, unknown: float, beside: tuple[str, ...], asked: list[str]
+):
+    accepted = [
+        entered("torque_constant@1", 0, p, unknown, beside),
+        entered("backlash@2", 1, 0.99, 0.0),
+    ]
+    model = SimpleNamespace(free=[named("torque_constant@1"), named("backlash@2")])
+    state = SimpleNamespace(model=model, accepted=accepted)
+    proposals = list(doubtful(Context(None, state, Settings())))  # type: ignore[arg-type]
+    assert [f.effect.label for x in proposals for f in x.gone] == asked
+    assert all(x.or_none == "doubtful" for x in proposals)

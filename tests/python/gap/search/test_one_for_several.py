@@ -9,8 +9,10 @@ from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, trial
 from axisight.gap.ranking.likelihood import likelier
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
-from axisight.gap.search.one_for_several import one_for_several, several_together
+from axisight.gap.search.contest import Context, decided
+from axisight.gap.search.one_for_several import merged, several_together
 from axisight.gap.search.search import _simpler
+from axisight.gap.search.state import SearchState
 from axisight.gap.views.closed_loop import ClosedLoopView
 from gap_data import bare_axis, log_of, logs_of, reference
 
@@ -32,16 +34,17 @@ def found(real: list[Effect], free: list[Hypothesis]) -> tuple[FittedModel, str 
         bare_axis(), logs_of(bare_axis(), real, PLAN, seconds=3.0), Settings(block_s=0.5)
     )
     model = view.fitter.fit(free)
+    one = merge_of(view, model, 1)
+    return model, None if one is None else one.best.trial.label
+
+
+def merge_of(view: ClosedLoopView, model: FittedModel, axis: int) -> AxisPosterior | None:
+    """How the effect stands that takes the place of several; None where they stay."""
     floor = view.floor.expected[model.axis] * model.size
-    one = one_for_several(
-        view.fitter,
-        model,
-        view.candidates(model, axes=[1]),
-        floor,
-        layout_of(model),
-        view.settings,
-    )
-    return model, None if one is None else one[0].trial.label
+    state = SearchState(model, model, floor, layout_of(model))
+    context = Context(view.fitter, state, view.settings, view.candidates(model, axes=[axis]))
+    decisions = (decided(context, proposal) for proposal in merged(context))
+    return next((d.standing for d in decisions if d is not None), None)
 
 
 @pytest.fixture(scope="module")
@@ -125,10 +128,8 @@ def in_place_of(
         logs.append(log_of(robot, machine, np.hstack(wanted), run))
     view = ClosedLoopView(robot, logs, Settings(block_s=0.5))
     model = view.fitter.fit(free)
-    floor = view.floor.expected[model.axis] * model.size
-    options = view.candidates(model, axes=[3])
-    one = one_for_several(view.fitter, model, options, floor, layout_of(model), view.settings)
-    return model, *((None, -1) if one is None else (one[0].trial.label, one[1].axis))
+    one = merge_of(view, model, 3)
+    return model, *((None, -1) if one is None else (one.best.trial.label, one.axis))
 
 
 LOAD = Effect("payload", None, {"mass_kg": 100.0, "x_m": 0.7, "y_m": 0.05, "z_m": 0.25})

@@ -1,12 +1,10 @@
-"""The search: what waits for the next round, what is withdrawn in the end."""
+"""The search: what waits for the next round, what a cause has to earn, the last fit."""
 
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from axisight import Effect, Settings
 from axisight.fitting.divergence import Diverged
@@ -15,9 +13,9 @@ from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.screening import search_round
 from axisight.gap.screening.screening import Start
 from axisight.gap.screening.search_round import SearchRound
-from axisight.gap.search import revision, search
+from axisight.gap.search import moves, search
 from axisight.gap.search import state as states
-from gap_data import StateStub, linear_evidence
+from gap_data import linear_evidence
 
 
 def free(label: str) -> Hypothesis:
@@ -107,89 +105,6 @@ def test_effects_of_the_arm_alone_are_tried():
     assert round_.fit({"payload": 1.0}) == ["payload"]
 
 
-@pytest.mark.parametrize(
-    ("probability", "left_in_the_end", "kept"),
-    [
-        # Something unknown is likelier, and most of what it was to explain is still there.
-        (0.04, 0.19, ["backlash@2"]),
-        # Others have explained the rest since.
-        (0.04, 0.02, ["torque_constant@1", "backlash@2"]),
-        # Nothing is likelier.
-        (0.95, 0.19, ["torque_constant@1", "backlash@2"]),
-    ],
-)
-def test_a_cause_less_likely_than_something_unknown_needs_the_rest_explained(
-    monkeypatch: pytest.MonkeyPatch, probability: float, left_in_the_end: float, kept: list[str]
-):
-    accepted = (
-        entered("torque_constant@1", 0, probability, 0.9 if probability < 0.5 else 0.02),
-        entered("backlash@2", 1, 0.99, 0.0),
-    )
-    state = searched(accepted, left=np.array([0.25, 5.0]), now=np.array([left_in_the_end, 4.0]))
-    monkeypatch.setattr(
-        revision, "settled", lambda _, kept, __: SimpleNamespace(free=kept, total=0.0)
-    )
-    revision.withdraw_doubtful(None, state, Settings())  # type: ignore[arg-type]
-    assert [f.effect.label for f in state.model.free] == kept
-
-
-def entered(label: str, axis: int, p: float, unknown: float, beside: Sequence[str] = ()):
-    fitted = SimpleNamespace(free=[free(x) for x in (*beside, label)])
-    ranked = SimpleNamespace(trial=SimpleNamespace(label=label, fitted=fitted), probability=p)
-    return ranked, SimpleNamespace(axis=axis, p_unknown=unknown)
-
-
-def searched(accepted, left, now):
-    model = SimpleNamespace(free=[free(r.trial.label) for r, _ in accepted])
-    round_ = states.Round((), accepted, left)
-    layout = Layout(*[np.zeros(4, int)] * 3, np.ones(4))
-
-    class State(StateStub):
-        @property
-        def accepted(self):
-            labels = {f.effect.label for f in self.model.free}
-            return [x for x in accepted if x[0].trial.label in labels]
-
-    return State(
-        model=model,
-        rounds=[round_],
-        left=lambda: now,
-        floor=np.ones(4),
-        layout=layout,
-    )
-
-
-@pytest.mark.parametrize(("explained", "stays"), [(0.1, False), (0.999, True)])
-def test_what_came_in_beside_a_cause_that_is_none_is_judged_anew(
-    monkeypatch: pytest.MonkeyPatch, explained: float, stays: bool
-):
-    accepted = (
-        entered("torque_constant@1", 0, 0.04, 0.9),
-        entered("link_com@1", 0, 1.0, 0.0, beside=["torque_constant@1"]),
-    )
-    state = searched(accepted, left=np.array([5.0]), now=np.array([4.9]))
-
-    class Fitter:
-        def fit(self, free_effects, start, *, lazy):
-            share = explained if free_effects else 0.0
-            return SimpleNamespace(
-                free=free_effects, held_out=1.0 + 99.0 * (1 - share) + np.zeros(4)
-            )
-
-    quiet = linear_evidence(np.ones((80, 1)), np.zeros(80), np.zeros(80, int))
-
-    def tried(candidate, fitted):
-        return search_round.FittedHypothesis(candidate, quiet, fitted.held_out)
-
-    monkeypatch.setattr(revision, "trial", tried)
-    monkeypatch.setattr(revision, "held_out_loss", lambda fitted: fitted.held_out)
-    monkeypatch.setattr(
-        revision, "settled", lambda _, kept, __: SimpleNamespace(free=kept, total=0.0)
-    )
-    revision.withdraw_doubtful(Fitter(), state, Settings())  # type: ignore[arg-type]
-    assert [f.effect.label for f in state.model.free] == (["link_com@1"] if stays else [])
-
-
 def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monkeypatch):
     """A stiff law may be fitted along a run of another model and break down by itself."""
     whole = SimpleNamespace(hypothesis=free("gear_hysteresis@1"), label="gear_hysteresis@1")
@@ -245,7 +160,7 @@ def finished(pull: float) -> list[dict[str, object]]:
     state = states.SearchState(
         model, model, np.zeros(2), Layout(*[np.zeros(2, int)] * 3, np.ones(2))
     )
-    revision.finish(Fitter(), state)
+    moves.finish(Fitter(), state)
     assert (state.model is model) == (not asked)
     return asked
 

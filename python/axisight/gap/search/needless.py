@@ -1,0 +1,72 @@
+"""Causes that the others have made needless, or that stand for something no effect of the library is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import effect_info
+from axisight.fitting.divergence import Diverged
+from axisight.gap.fit.fitted_model import Hypothesis
+from axisight.gap.fit.held_out import linear_gain
+from axisight.gap.search.contest import Context, Proposal
+
+Array = NDArray[np.float64]
+
+
+def needless(context: Context) -> Iterator[Proposal]:
+    """Propose to go on without one cause: that which takes away least by a linear step, or stands in for another.
+
+    A load that came in beside a link with another centre of mass lies elsewhere itself, further than one step
+    goes: a cause of the family of an effect of the whole arm is always tried.
+    """
+    free = context.state.model.free
+    if len(free) < 2:
+        return
+    taken = [_taken_away(context, f) / _counted(context, f) for f in free]
+    least = int(np.argmin(taken))
+    if taken[least] <= context.settings.smallest_gain:
+        yield _without(free[least])
+    families = {effect_info(f.effect.name).family for f in free if f.effect.place is None}
+    for f in free:
+        if f.effect.axis is not None and effect_info(f.effect.name).family in families:
+            yield _without(f)
+
+
+def _without(cause: Hypothesis) -> Proposal:
+    axis = cause.effect.axis
+    return Proposal((axis or 1) - 1, (cause,), or_none="needless", everywhere=axis is None)
+
+
+def _counted(context: Context, cause: Hypothesis) -> float:
+    """Return what the residuals of the axis of a cause count for."""
+    samples = context.state.layout.samples()
+    return float(samples[cause.effect.axis - 1] if cause.effect.axis else samples.min())
+
+
+def _taken_away(context: Context, cause: Hypothesis) -> float:
+    """Return the loss that a cause takes away, where the others take one linear step without it."""
+    model = context.state.model
+    others = [f for f in model.free if f is not cause]
+    without = context.fitter.evaluate(others, model, robot_values=model.robot_values)
+    if isinstance(without, Diverged):
+        # A loop that swings without end lacks it.
+        return float("inf")
+    return without.total - linear_gain(without) - model.total
+
+
+def doubtful(context: Context) -> Iterator[Proposal]:
+    """Propose to go on without causes that something unknown was likelier than as they came in.
+
+    One that explains a small part of its axis is a cause if others explain the rest. What came in beside one that
+    went out since is in doubt, too.
+    """
+    state = context.state
+    final = {f.effect.label for f in state.model.free}
+    for cause, standing in state.accepted:
+        beside = {f.effect.label for f in cause.trial.fitted.free}
+        if standing.p_unknown > cause.probability or not beside <= final:
+            mine = next(f for f in state.model.free if f.effect.label == cause.trial.label)
+            yield Proposal(standing.axis, (mine,), or_none="doubtful")

@@ -1,0 +1,78 @@
+"""A rival in the place of a cause: what came in since, or turned out to be none, may have hidden which it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from axisight.effects import Effect
+from axisight.gap.fit.tolerance_edges import bent
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
+from axisight.gap.search.contest import Alternative, Context, Proposal
+from axisight.gap.search.state import alike
+
+# Rivals of one cause that are tried.
+_RIVALS = 3
+# What a rival explained, of what the cause did, where that was judged beside one that is none.
+_NEARLY = 0.8
+
+
+def exchanged(context: Context) -> Iterator[Proposal]:
+    """Propose the rivals of each cause that was judged otherwise than it stands now, in its place."""
+    state = context.state
+    final = {f.effect.label for f in state.model.free}
+    crooked = bent(context.fitter, state.model) > 0
+    last = state.rounds[-1].standings
+    for cause, standing in state.accepted:
+        beside = {f.effect.label for f in cause.trial.fitted.free}
+        if not beside <= final:
+            rivals = _nearly_as_good(cause, standing)
+        elif mends := mending(cause, last):
+            rivals = mends
+        elif beside < final or crooked:
+            rivals = open_rivals(cause, state.standings_of(cause))
+        else:
+            continue
+        alone = len(state.model.free) == 1
+        instead = tuple(
+            Alternative(r.trial.fitted.free[-1], r.trial.fitted if alone else None)
+            for r in rivals
+            if r.trial.label not in final
+        )[:_RIVALS]
+        if instead:
+            mine = next(f for f in state.model.free if f.effect.label == cause.trial.label)
+            yield Proposal(standing.axis, (mine,), instead)
+
+
+def _nearly_as_good(cause: RankedHypothesis, entered: AxisPosterior) -> list[RankedHypothesis]:
+    """Return what explained nearly as much as a cause of its axis, as it entered."""
+    axis = cause.trial.hypothesis.effect.axis
+    near = (r for r in entered.ranked if r.score >= _NEARLY * cause.score)
+    return [r for r in near if r is not cause and r.trial.hypothesis.effect.axis == axis]
+
+
+def open_rivals(
+    cause: RankedHypothesis, entered: Sequence[AxisPosterior]
+) -> list[RankedHypothesis]:
+    """Return what could not be told from a cause as it entered, the likeliest first.
+
+    ``entered``: how its round stood.
+    """
+    label = cause.trial.label
+    led = [s for s in entered if s.best.trial.label == label]
+    stood = sorted((r for s in led for r in s.inseparable()), key=lambda r: -r.probability)
+    likeliest = {r.trial.label: r for r in reversed(stood)}
+    return [r for r in stood if r is likeliest[r.trial.label] and r.trial.label != label]
+
+
+def mending(cause: RankedHypothesis, standings: Sequence[AxisPosterior]) -> list[RankedHypothesis]:
+    """Return the laws of the gear or the dry friction of a cause that lead its axis beside it.
+
+    Such a law is no second cause. It may be the right one, whose first fit had not come far.
+    """
+    first = cause.trial.hypothesis.effect
+    leading = (s.best for s in standings if s.axis + 1 == first.axis)
+    return [r for r in leading if _mends(r.trial.hypothesis.effect, first)]
+
+
+def _mends(law: Effect, first: Effect) -> bool:
+    return law.axis == first.axis and law.label != first.label and alike(law, first)
