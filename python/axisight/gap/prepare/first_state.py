@@ -44,8 +44,8 @@ def with_first_state(
     """Return references (m, n_axes) [rad/s] before a log that leave least of its first ``seconds``.
 
     Of its torque or, without its mean, its position, as ``compared`` says. Gauss-Newton, by simulations with
-    each change of ``references``, from rest at the joint angles ``start_rad``;
-    unchanged where nothing is gained.
+    each change of ``references``, from rest at the joint angles ``start_rad``; what the changes do hardly changes
+    from step to step, and is simulated once. Unchanged where nothing is gained.
     """
     n = round(seconds / log.sample_time_s)
 
@@ -54,11 +54,11 @@ def with_first_state(
 
     moves = _moves(log, len(references))
     best = references
-    left = missed(best[None])[0]
+    left, *moved = missed(np.concatenate([best[None], best + moves]))
+    columns = (np.array(moved) - left).T
+    if not (np.isfinite(columns).all() and np.isfinite(left).all()):
+        return best
     for _ in range(_STEPS):
-        columns = (missed(best + moves) - left).T
-        if not (np.isfinite(columns).all() and np.isfinite(left).all()):
-            break
         shares = scipy.linalg.lstsq(columns, -left, cond=_TOLD)[0]
         found = best + np.tensordot(shares, moves, axes=1)
         after = missed(found[None])[0]
