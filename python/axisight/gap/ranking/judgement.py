@@ -73,7 +73,7 @@ def stand(
         losses,
         explainable,
         least,
-        lambda left, which: -0.5 * INDEPENDENT_BLOCKS * np.log(left) - cost[which],
+        lambda left, which: -0.5 * INDEPENDENT_BLOCKS * np.log(left) - (cost + prices)[which],
     )
     belief.becomes("formula_error", apart)
     explained = (before - losses) / explainable

@@ -468,3 +468,20 @@ def test_of_equal_fits_the_one_that_bends_the_simulator_less_is_likelier():
     said = {e.hypothesis: e.nats for e in found.ledger if e.rule == "own_parameters"}
     assert said == pytest.approx({link.label: -12.5, load.label: -0.25})
     assert found.ranked[1].probability / found.best.probability == pytest.approx(np.exp(-12.25))
+
+
+def test_bending_counts_between_weights_that_are_held_apart_too():
+    """Both leave next to nothing, and are held against one another by the error of rigid bodies."""
+    names = {"link_mass": ("relative_change",), "motor_inertia": ("relative_change",)}
+    trials = [
+        FittedHypothesis(Hypothesis(Effect(name, 1), free), NO_EFFECT, np.full(40, 1.0))
+        for name, free in names.items()
+    ]
+    straight = standing([bent(trials[0], 0.0), bent(trials[1], 0.0)])
+    crooked = standing([bent(trials[0], 4.0), bent(trials[1], 0.0)])
+    odds = [
+        {r.trial.label: r.probability for r in s.ranked}["link_mass@1"] / s.best.probability
+        for s in (straight, crooked)
+    ]
+    assert odds[0] == pytest.approx(1.0)
+    assert odds[1] == pytest.approx(np.exp(-0.5 * 4.0**2))
