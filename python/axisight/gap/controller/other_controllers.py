@@ -7,12 +7,13 @@ other one. The simulator that is kept on a log does not see it: its feedback is 
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy
-import tomlkit
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
@@ -136,8 +137,13 @@ class _Law:
 
 def is_continuous(robot: Robot) -> bool:
     """Whether a law acts between its samples too."""
-    stated = tomlkit.parse(robot.toml).unwrap().get("controller", {})
-    return bool(stated.get("continuous")) or robot.stepped is not None
+    return _states_continuous(robot.toml) or robot.stepped is not None
+
+
+@cache
+def _states_continuous(toml: str) -> bool:
+    """Whether a robot file says so; asked for every log and axis, and read once."""
+    return bool(tomllib.loads(toml).get("controller", {}).get("continuous"))
 
 
 def other_controllers(robot: Robot, logs: Sequence[Log]) -> tuple[AlgebraicCause, ...]:
