@@ -82,6 +82,8 @@ def decided(context: Context, proposal: Proposal) -> Decision | None:
     """Return what takes the place of causes; None where they stay, since nothing else is likelier."""
     fitter, model = context.fitter, context.state.model
     rest = [f for f in model.free if f.effect.label not in proposal.labels]
+    if proposal.or_none == "needless":
+        return _without(context, proposal, rest)
     without = fitter.fit(rest, model, lazy=True)
     if isinstance(without, Diverged):
         # A loop that swings without end lacks them.
@@ -95,9 +97,29 @@ def decided(context: Context, proposal: Proposal) -> Decision | None:
     standing = contest.standing([present, *rivals])
     if standing is not None and rivals:
         standing = contest.standing(contest.with_second_fits(standing, present))
-    if standing is None or contest.goes_out(standing, present):
-        return None if proposal.or_none == "never" else Decision(without, None)
-    return None if standing.best.trial is present else contest.decision(standing)
+    if proposal.or_none == "doubtful" and (standing is None or _is_none(standing)):
+        return Decision(without, None)
+    if standing is None or standing.best.trial is present:
+        return None
+    return contest.decision(standing)
+
+
+def _without(context: Context, proposal: Proposal, rest: Sequence[Hypothesis]) -> Decision | None:
+    """Return the model without causes, where it leaves no more than what a cause has to take away."""
+    model = context.state.model
+    found = settled(context.fitter, rest, model)
+    if isinstance(found, Diverged):
+        # A loop that swings without end lacks them.
+        return None
+    samples = context.state.layout.samples()
+    counted = float(samples.min() if proposal.everywhere else samples[proposal.axis])
+    little = found.total - model.total <= context.settings.smallest_gain * counted
+    return Decision(found, None) if little else None
+
+
+def _is_none(standing: AxisPosterior) -> bool:
+    """Whether nothing, or something unknown, is likelier than what leads."""
+    return standing.p_none + standing.p_unknown > standing.best.probability
 
 
 class _Contest:
@@ -172,15 +194,3 @@ class _Contest:
     def _settled(self, one: FittedHypothesis) -> FittedHypothesis:
         found = settled(self.fitter, one.fitted.free, one.fitted)
         return one if isinstance(found, Diverged) else trial(one.hypothesis, found)
-
-    def goes_out(self, standing: AxisPosterior, present: FittedHypothesis) -> bool:
-        """Whether nothing takes the place of the causes: it is likelier, or they take away too little."""
-        if self.proposal.or_none == "never" or standing.best.trial is not present:
-            return False
-        if self.proposal.or_none == "doubtful":
-            return standing.p_none + standing.p_unknown > standing.best.probability
-        samples = self.state.layout.samples()
-        effect = self.proposal.gone[-1].effect
-        counted = float(samples[effect.axis - 1] if effect.axis else samples.min())
-        fall = self.without.total - self.state.model.total
-        return fall <= self.settings.smallest_gain * counted
