@@ -52,7 +52,7 @@ def start_of(robot: Robot, position_rad: Array) -> Array:
     """
     angle = np.array(robot.operating_point, float)
     for _ in range(_STEPS):
-        motor = np.asarray(robot.core.equilibrium([], angle.tolist())["motor_angle"])
+        motor = robot.equilibrium(angle.tolist())["motor_angle_rad"].values
         angle = angle + (position_rad - motor) * robot.gear_ratio
     return angle
 
