@@ -24,7 +24,7 @@ from axisight.gap.ranking.likelihood import (
 )
 from axisight.gap.ranking.own_parameters import price_of_bending
 from axisight.gap.ranking.plainer_law import held_to_plainer
-from axisight.gap.ranking.posterior import TINY, AxisPosterior, RankedHypothesis
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis, in_order
 
 Array = NDArray[np.float64]
 
@@ -94,20 +94,8 @@ def stand(
         )
         for t, loss, p in zip(mine, losses, probability, strict=False)
     ]
-    ranked.sort(key=lambda r: _order(r, axis))
     none, unknown = (float(p) for p in probability[-2:])
-    return AxisPosterior(axis or 0, tuple(ranked), none, unknown, tuple(belief.ledger))
-
-
-# Nats within which two hypotheses are as likely: less than fits leave open.
-_AS_LIKELY = 0.01
-
-
-def _order(one: RankedHypothesis, axis: int | None) -> tuple[float, bool, float, str]:
-    """Return by what hypotheses are in order: of those as likely, what acts on this axis alone comes first."""
-    nats = np.log(max(one.probability, TINY))
-    elsewhere = axis is not None and one.trial.hypothesis.effect.axis != axis + 1
-    return -float(np.round(nats / _AS_LIKELY)), elsewhere, -one.score, one.trial.label
+    return AxisPosterior(axis or 0, in_order(ranked, axis), none, unknown, tuple(belief.ledger))
 
 
 def _costs(trials: Sequence[FittedHypothesis]) -> Array:

@@ -7,6 +7,8 @@ that; where much is, they stay and their prior counts. The cheaper of both is th
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,17 +22,28 @@ def price_of_bending(fitted: FittedModel, weight: Array) -> float:
     """Return the least of what priors, and data as the belief weighs them, say against a model [nats].
 
     Half of ``min_s chi2(s) + sum_b weight_b (2 g_b s + s M_b s)`` over steps s from where the fit ended: chi2 of the
-    priors, and the loss of each block to second order. ``weight`` (n_blocks,): nats of the belief for each of
-    those of the fit.
+    priors of own parameters, and the loss of each block to second order. ``weight`` (n_blocks,): nats of the belief
+    for each of those of the fit.
     """
-    precision = np.diag(fitted.prior_matrix)
-    told = precision > 0
-    off = float((fitted.prior_gradient[told] ** 2 / precision[told]).sum())
-    influence = np.einsum("bii->i", fitted.matrix)
-    free = np.array([name not in fitted.at_bound for name in fitted.parameters], dtype=bool)
-    free |= np.array([place is None for place, _ in fitted.parameters], dtype=bool)
-    free &= influence + precision > 0
-    pick = np.ix_(free, free)
-    matrix = np.tensordot(weight, fitted.matrix, 1) + fitted.prior_matrix
-    pull = (weight @ fitted.gradient + fitted.prior_gradient)[free]
-    return max(0.5 * (off - float(pull @ pseudo_inverse(matrix[pick]) @ pull)), 0.0)
+    kept = _KEPT.setdefault(fitted, {})
+    key = weight.tobytes()
+    if key not in kept:
+        kept[key] = _price(fitted, weight)
+    return kept[key]
+
+
+# Prices of models by weights: axes and rounds of refinement ask for them again and again.
+_KEPT: WeakKeyDictionary[FittedModel, dict[bytes, float]] = WeakKeyDictionary()
+
+
+def _price(fitted: FittedModel, weight: Array) -> float:
+    own = np.array([place is None for place, _ in fitted.parameters], dtype=bool)
+    precision = np.where(own, np.diag(fitted.prior_matrix), 0.0)
+    gradient = np.where(precision > 0, fitted.prior_gradient, 0.0)
+    off = float((gradient**2 / np.where(precision > 0, precision, 1.0)).sum())
+    free = own | np.array([name not in fitted.at_bound for name in fitted.parameters], dtype=bool)
+    free &= np.einsum("bii->i", fitted.matrix) + precision > 0
+    matrix = np.tensordot(weight, fitted.matrix, 1) + np.diag(precision)
+    pull = (weight @ fitted.gradient + gradient)[free]
+    gained = float(pull @ pseudo_inverse(matrix[np.ix_(free, free)]) @ pull)
+    return max(0.5 * (off - gained), 0.0)

@@ -42,6 +42,22 @@ class RankedHypothesis:
         return effect_info(self.trial.hypothesis.effect.name).family
 
 
+# Ratio of probabilities within which two hypotheses are as likely: less than fits leave open.
+_AS_LIKELY = 0.99
+
+
+def in_order(ranked: Sequence[RankedHypothesis], axis: int | None) -> tuple[RankedHypothesis, ...]:
+    """Return hypotheses, the most probable first; of those as likely as it, what acts on ``axis`` (from 0) alone."""
+    found = sorted(ranked, key=lambda r: (-r.probability, -r.score, r.trial.label))
+
+    def behind(r: RankedHypothesis) -> tuple[bool, bool]:
+        level = r.probability >= _AS_LIKELY * found[0].probability
+        elsewhere = axis is not None and r.trial.hypothesis.effect.axis != axis + 1
+        return not level, level and elsewhere
+
+    return tuple(sorted(found, key=behind))
+
+
 @dataclass(frozen=True)
 class AxisPosterior:
     """How the candidates stand on one axis (from 0), best first; with the two that are none.
@@ -66,9 +82,9 @@ class AxisPosterior:
         weighed = [(odds.get(r.trial.label, 1.0), r) for r in self.ranked]
         changed = [(times, r) for times, r in weighed if times != 1]
         left = [(times * r.probability, r) for times, r in weighed]
-        if changed:
-            left.sort(key=lambda pair: -pair[0])
-        return self._of(left, [Adjustment(rule, r.trial.label, log_odds(x)) for x, r in changed])
+        entries = [Adjustment(rule, r.trial.label, log_odds(x)) for x, r in changed]
+        found = self._of(left, entries)
+        return replace(found, ranked=in_order(found.ranked, self.axis)) if changed else found
 
     def without(self, *labels: str) -> AxisPosterior:
         """Return the same without some candidates, by label."""

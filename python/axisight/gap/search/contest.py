@@ -1,4 +1,4 @@
-"""Sets of causes that differ in one place, held against one another by the belief: how every move is decided."""
+"""Sets of causes that differ in one place, held against one another: how every move is decided."""
 
 from __future__ import annotations
 
@@ -23,23 +23,24 @@ from axisight.gap.search.state import SearchState
 
 Array = NDArray[np.float64]
 
-# A first fit this much less likely than the leader [1] is no ground for a second one.
-_PROMISING = 1e-6
-
 
 @dataclass(frozen=True)
 class Context:
-    """What moves work with: the fitter, the state that they change, and the hypotheses ``offered``."""
+    """What moves work with: the fitter, the state that they change, and the hypotheses ``offered``.
+
+    ``last``: how the axes stood in the last round of the search.
+    """
 
     fitter: ModelFitter
     state: SearchState
     settings: Settings
     offered: Sequence[Hypothesis] = ()
+    last: Sequence[AxisPosterior] = ()
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """An effect that may be in the place of causes, and a model to fit it from; by default the one in question."""
+    """An effect that may be in the place of causes, and a model to fit it from; by default the one without them."""
 
     hypothesis: Hypothesis
     start: FittedModel | None = None
@@ -90,7 +91,8 @@ def decided(context: Context, proposal: Proposal) -> Decision | None:
         return None
     contest = _Contest(context, proposal, without)
     present = trial(proposal.gone[-1], model.ending_with(proposal.gone[-1]))
-    present = replace(present, also=proposal.gone[:-1])
+    idle = sum(trial(f, model.ending_with(f)).idle for f in proposal.gone)
+    present = replace(present, also=proposal.gone[:-1], idle=idle)
     rivals = [t for one in proposal.instead if (t := contest.tried(rest, one)) is not None]
     if proposal.gone[:-1]:
         return contest.one_for(present, rivals)
@@ -98,7 +100,8 @@ def decided(context: Context, proposal: Proposal) -> Decision | None:
     if standing is not None and rivals:
         standing = contest.standing(contest.with_second_fits(standing, present))
     if proposal.or_none == "doubtful" and (standing is None or _is_none(standing)):
-        return Decision(without, None)
+        out = settled(fitter, rest, without)
+        return None if isinstance(out, Diverged) else Decision(out, None)
     if standing is None or standing.best.trial is present:
         return None
     return contest.decision(standing)
@@ -111,8 +114,7 @@ def _without(context: Context, proposal: Proposal, rest: Sequence[Hypothesis]) -
     if isinstance(found, Diverged):
         # A loop that swings without end lacks them.
         return None
-    samples = context.state.layout.samples()
-    counted = float(samples.min() if proposal.everywhere else samples[proposal.axis])
+    counted = context.state.counted(None if proposal.everywhere else proposal.axis)
     little = found.total - model.total <= context.settings.smallest_gain * counted
     return Decision(found, None) if little else None
 
@@ -132,9 +134,10 @@ class _Contest:
         self.place = None if proposal.everywhere else proposal.axis
 
     def tried(self, rest: Sequence[Hypothesis], one: Alternative) -> FittedHypothesis | None:
-        """Return an alternative beside the rest of the model; None if it cannot be simulated."""
-        free = [*kept_beside(rest, one.hypothesis), one.hypothesis]
-        found = self.fitter.fit(free, one.start or self.without, lazy=True)
+        """Return an alternative beside the rest; None if it cannot be simulated, or contains some of the rest."""
+        if len(kept_beside(rest, one.hypothesis)) < len(rest):
+            return None
+        found = self.fitter.fit([*rest, one.hypothesis], one.start or self.without, lazy=True)
         return None if isinstance(found, Diverged) else trial(one.hypothesis, found)
 
     def standing(self, trials: Sequence[FittedHypothesis]) -> AxisPosterior | None:
@@ -184,13 +187,17 @@ class _Contest:
     def with_second_fits(
         self, standing: AxisPosterior, present: FittedHypothesis
     ) -> list[FittedHypothesis]:
-        """Return the trials, those near the leader with sensitivities of their own."""
-        least = _PROMISING * standing.best.probability
-        return [
-            r.trial if r.trial is present or r.probability < least else self._settled(r.trial)
-            for r in standing.ranked
-        ]
+        """Return the trials with sensitivities of their own: all rivals of one cause, the best of several causes.
 
-    def _settled(self, one: FittedHypothesis) -> FittedHypothesis:
+        One that cannot be simulated with these is none.
+        """
+        rivals = [r.trial for r in standing.ranked if r.trial is not present]
+        best = min(rivals, key=lambda t: float(t.held_out.sum()), default=None)
+        again = [t for t in rivals if t is best or not self.proposal.gone[:-1]]
+        fits = {id(t): self._settled(t) for t in again}
+        found = [fits.get(id(r.trial), r.trial) for r in standing.ranked]
+        return [t for t in found if t is not None]
+
+    def _settled(self, one: FittedHypothesis) -> FittedHypothesis | None:
         found = settled(self.fitter, one.fitted.free, one.fitted)
-        return one if isinstance(found, Diverged) else trial(one.hypothesis, found)
+        return None if isinstance(found, Diverged) else trial(one.hypothesis, found)

@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from axisight.fitting.divergence import Diverged, must_hold
+from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.held_out import linear_gain
 from axisight.gap.fit.model_fitter import ModelFitter
-from axisight.gap.fit.settling import settled
 from axisight.gap.ranking.posterior import AxisPosterior
 from axisight.gap.search.contest import Context, Decision, Proposal, decided
 from axisight.gap.search.needless import doubtful, needless
@@ -77,12 +76,12 @@ def _made(move: Move, context: Context, tried: set[tuple[frozenset[str], frozens
 def _take(name: str, context: Context, proposal: Proposal, decision: Decision) -> None:
     """Take a set of causes into the state, fitted until it settles, with how what is new in it stood."""
     state, standing = context.state, decision.standing
-    left = state.left()
+    left, before = state.left(), {f.effect.label for f in state.model.free}
     if standing is not None and proposal.as_entered:
         standing = _as_entered(state, proposal, standing)
-    model = decision.model
-    state.moved(name, must_hold(settled(context.fitter, model.free, model)))
-    if standing is not None:
+    state.moved(name, decision.model)
+    # What was a cause before, and does it alone now, stands as it did, with all its rivals.
+    if standing is not None and standing.best.trial.label not in before:
         state.rounds.append(Round((standing,), ((standing.best, standing),), left))
 
 

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def needless(context: Context) -> Iterator[Proposal]:
-    """Propose to go on without one cause: that which takes away least by a linear step, or stands in for another.
+    """Propose to go on without one cause: what takes away too little by a linear step, least first, or stands in.
 
     A load that came in beside a link with another centre of mass lies elsewhere itself, further than one step
     goes: a cause of the family of an effect of the whole arm is always tried.
@@ -25,10 +25,10 @@ def needless(context: Context) -> Iterator[Proposal]:
     free = context.state.model.free
     if len(free) < 2:
         return
-    taken = [_taken_away(context, f) / _counted(context, f) for f in free]
-    least = int(np.argmin(taken))
-    if taken[least] <= context.settings.smallest_gain:
-        yield _without(free[least])
+    taken = np.array([_taken_away(context, f) for f in free])
+    for i in np.argsort(taken):
+        if taken[i] <= context.settings.smallest_gain:
+            yield _without(free[i])
     families = {effect_info(f.effect.name).family for f in free if f.effect.place is None}
     for f in free:
         if f.effect.axis is not None and effect_info(f.effect.name).family in families:
@@ -40,21 +40,16 @@ def _without(cause: Hypothesis) -> Proposal:
     return Proposal((axis or 1) - 1, (cause,), or_none="needless", everywhere=axis is None)
 
 
-def _counted(context: Context, cause: Hypothesis) -> float:
-    """Return what the residuals of the axis of a cause count for."""
-    samples = context.state.layout.samples()
-    return float(samples[cause.effect.axis - 1] if cause.effect.axis else samples.min())
-
-
 def _taken_away(context: Context, cause: Hypothesis) -> float:
-    """Return the loss that a cause takes away, where the others take one linear step without it."""
-    model = context.state.model
+    """Return the mean square that a cause takes away, where the others take one linear step without it."""
+    model, axis = context.state.model, cause.effect.axis
     others = [f for f in model.free if f is not cause]
     without = context.fitter.evaluate(others, model, robot_values=model.robot_values)
     if isinstance(without, Diverged):
         # A loop that swings without end lacks it.
         return float("inf")
-    return without.total - linear_gain(without) - model.total
+    taken = without.total - linear_gain(without) - model.total
+    return taken / context.state.counted(None if axis is None else axis - 1)
 
 
 def doubtful(context: Context) -> Iterator[Proposal]:
@@ -64,9 +59,10 @@ def doubtful(context: Context) -> Iterator[Proposal]:
     went out since is in doubt, too.
     """
     state = context.state
-    final = {f.effect.label for f in state.model.free}
+    steps = [step for step in state.steps if step.move == "withdraw"]
+    out = {label for step in steps for label in step.before if label not in step.after}
     for cause, standing in state.accepted:
         beside = {f.effect.label for f in cause.trial.fitted.free}
-        if standing.p_unknown > cause.probability or not beside <= final:
+        if standing.p_unknown > cause.probability or not beside.isdisjoint(out):
             mine = next(f for f in state.model.free if f.effect.label == cause.trial.label)
             yield Proposal(standing.axis, (mine,), or_none="doubtful")

@@ -31,7 +31,7 @@ def merged(context: Context) -> Iterator[Proposal]:
             tuple(Alternative(o) for o in others),
             # A load shows on every axis that carries it, and has to do on all.
             everywhere=_is_load(several[0]),
-            leeway=0.0 if context.fitter.adds_up else _leeway(several),
+            leeway=0.0 if context.fitter.adds_up or len(several) == 1 else _leeway(several),
             as_entered=len(several) == 1,
         )
 

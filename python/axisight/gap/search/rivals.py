@@ -21,12 +21,11 @@ def exchanged(context: Context) -> Iterator[Proposal]:
     state = context.state
     final = {f.effect.label for f in state.model.free}
     crooked = bent(context.fitter, state.model) > 0
-    last = state.rounds[-1].standings
     for cause, standing in state.accepted:
         beside = {f.effect.label for f in cause.trial.fitted.free}
         if not beside <= final:
             rivals = _nearly_as_good(cause, standing)
-        elif mends := mending(cause, last):
+        elif mends := mending(cause, context.last):
             rivals = mends
         elif beside < final or crooked:
             rivals = open_rivals(cause, state.standings_of(cause))
@@ -34,7 +33,7 @@ def exchanged(context: Context) -> Iterator[Proposal]:
             continue
         alone = len(state.model.free) == 1
         instead = tuple(
-            Alternative(r.trial.fitted.free[-1], r.trial.fitted if alone else None)
+            Alternative(r.trial.fitted.free[-1], r.trial.fitted if alone else state.model)
             for r in rivals
             if r.trial.label not in final
         )[:_RIVALS]

@@ -96,7 +96,7 @@ def search(
         refused |= make(AFTER_EACH_ROUND, Context(fitter, out, settings, offered))
         if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
             break
-    make(AT_THE_END, Context(fitter, out, settings))
+    make(AT_THE_END, Context(fitter, out, settings, last=out.rounds[-1].standings))
     finish(fitter, out)
     return out
 

@@ -83,11 +83,12 @@ class SearchState:
 
     def left(self) -> Array:
         """Return the held-out loss of the model above the floor, by axis (n_axes,)."""
-        return self.left_by(self.model)
+        return self.layout.by_axis(held_out_loss(self.model) - self.floor)
 
-    def left_by(self, model: FittedModel) -> Array:
-        """Return the same of another model."""
-        return self.layout.by_axis(held_out_loss(model) - self.floor)
+    def counted(self, axis: int | None) -> float:
+        """Return what the residuals of an axis (from 0) count for; where that is None of the one that counts least."""
+        samples = self.layout.samples()
+        return float(samples.min() if axis is None else samples[axis])
 
     def removed(self) -> Array:
         """Return how much of it the causes remove, by axis (n_axes,)."""

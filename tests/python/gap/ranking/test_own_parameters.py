@@ -70,3 +70,9 @@ def test_a_parameter_at_its_bound_pays_too():
     fitted = bent([4.0], data=10.0)
     held = replace(fitted, at_bound=fitted.parameters)
     assert price_of_bending(held, weights(held, 1.0)) == pytest.approx(8.0)
+
+
+def test_priors_of_effects_are_no_part_of_it():
+    fitted = bent([4.0, 3.0], data=10.0)
+    other = replace(fitted, parameters=(fitted.parameters[0], (0, "damping")))
+    assert price_of_bending(other, weights(other, 1.0)) <= 0.5 * 4.0**2

@@ -485,3 +485,17 @@ def test_bending_counts_between_weights_that_are_held_apart_too():
     ]
     assert odds[0] == pytest.approx(1.0)
     assert odds[1] == pytest.approx(np.exp(-0.5 * 4.0**2))
+
+
+def test_of_what_is_as_likely_that_of_the_axis_comes_first_and_stays_so():
+    here = a_trial("viscous_friction", 1, np.full(40, 1.1), axis=1)
+    elsewhere = a_trial("viscous_friction", 1, np.full(40, 1.1 - 1e-9), axis=2)
+    poor = a_trial("viscous_friction", 1, np.full(40, 6.0), axis=3)
+    found = standing([poor, elsewhere, here])
+    assert found.ranked[0].probability < found.ranked[1].probability
+    assert [r.trial for r in found.ranked] == [here, elsewhere, poor]
+    weighed = found.adjusted("other_axes", {poor.label: 0.5})
+    assert [r.trial for r in weighed.ranked] == [here, elsewhere, poor]
+    # What is clearly likelier is first wherever it acts.
+    weighed = found.adjusted("other_axes", {here.label: 0.9})
+    assert weighed.best.trial is elsewhere

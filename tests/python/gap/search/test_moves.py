@@ -3,12 +3,15 @@
 from collections.abc import Iterator
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from axisight import Effect
 from axisight.gap import Settings
 from axisight.gap.facts.trace import MOVES
 from axisight.gap.fit.fitted_model import Hypothesis
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.search import moves
 from axisight.gap.search.contest import Context, Decision, Proposal
 from axisight.gap.search.moves import AFTER_EACH_ROUND, AT_THE_END, Move, make
@@ -45,7 +48,6 @@ class Search:
             return Decision(SimpleNamespace(free=rest), None) if label in out else None  # type: ignore[arg-type]
 
         monkeypatch.setattr(moves, "decided", decided)
-        monkeypatch.setattr(moves, "settled", lambda _fitter, _free, model: model)
 
 
 def each(context: Context) -> Iterator[Proposal]:
@@ -88,3 +90,42 @@ def test_what_follows_a_move_is_made_where_that_changed_something(out: set[str],
 
     make([Move("exchange", each, then=(Move("drop", after),))], found.context)
     assert followed == ([2] if out else [])
+
+
+def ranked(one: Hypothesis, probability: float) -> RankedHypothesis:
+    trial = FittedHypothesis(one, SimpleNamespace(free=(one,)), np.zeros(1))  # type: ignore[arg-type]
+    return RankedHypothesis(trial, 0.9, 1.0, 9.0, probability)
+
+
+def taken(new: Hypothesis, *, as_entered: bool) -> StateStub:
+    """A state after one effect has taken the place of play that stood beside a drag as it came in."""
+    came_in = AxisPosterior(0, (ranked(PLAY, 0.6), ranked(DRAG, 0.4)), 0.0, 0.0)
+    state = StateStub(
+        model=SimpleNamespace(free=[PLAY, OFFSET]),
+        left=lambda: np.array([5.0]),
+        rounds=[],
+        accepted=[(came_in.best, came_in), (ranked(OFFSET, 1.0), came_in)],
+    )
+    context = Context(None, state, Settings())  # type: ignore[arg-type]
+    standing = AxisPosterior(0, (ranked(new, 1.0),), 0.0, 0.0)
+    model = SimpleNamespace(free=[new])
+    moves._take(
+        "merge", context, Proposal(0, (PLAY,), as_entered=as_entered), Decision(model, standing)
+    )  # type: ignore[arg-type]
+    assert state.model is model
+    return state
+
+
+@pytest.mark.parametrize(("as_entered", "rivals"), [(True, 2), (False, 1)])
+def test_what_takes_a_place_stands_as_the_contest_or_the_round_had_it(
+    as_entered: bool, rivals: int
+):
+    (added,) = taken(DRAG, as_entered=as_entered).rounds
+    ((cause, standing),) = added.accepted
+    assert cause.trial.label == "quadratic_drag@1" == standing.best.trial.label
+    assert len(standing.ranked) == rivals
+    assert added.left.tolist() == [5.0]
+
+
+def test_one_of_the_causes_that_does_it_alone_stands_as_it_did():
+    assert taken(OFFSET, as_entered=False).rounds == []

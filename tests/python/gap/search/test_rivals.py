@@ -103,10 +103,29 @@ def test_a_cause_is_judged_anew_where_it_stands_otherwise_now(
     state = SimpleNamespace(
         model=SimpleNamespace(free=final),
         accepted=[(standing.best, standing)],
-        rounds=[SimpleNamespace(standings=())],
         standings_of=lambda _: (standing,),
     )
     monkeypatch.setattr(rivals, "bent", lambda *_: float(crooked))
-    proposals = list(exchanged(SimpleNamespace(fitter=None, state=state)))
+    proposals = list(exchanged(SimpleNamespace(fitter=None, state=state, last=())))
     assert [a.hypothesis.effect.label for p in proposals for a in p.instead] == tried
     assert all(p.gone == (SOFT,) and p.axis == 0 for p in proposals)
+
+
+def test_a_law_that_mends_is_proposed_whatever_rounds_moves_have_added(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """How the last round of the search stood counts, for every axis."""
+    dry = of("coulomb_friction", 1, coulomb_nm=0.5)
+    waves = standing_of(Effect("position_dependent_friction", 1, {"cosine_nm": 0.3}))
+    standing = AxisPosterior(0, (ranked(dry, 1.0),), 0.0, 0.0)
+    state = SimpleNamespace(
+        model=SimpleNamespace(free=(dry,)),
+        accepted=[(standing.best, standing)],
+        rounds=[SimpleNamespace(standings=(standing,))],
+        standings_of=lambda _: (standing,),
+    )
+    monkeypatch.setattr(rivals, "bent", lambda *_: 0.0)
+    (found,) = exchanged(SimpleNamespace(fitter=None, state=state, last=(waves,)))
+    assert [a.hypothesis.effect.name for a in found.instead] == ["position_dependent_friction"]
+    # Alone it is fitted on from where its trial ended.
+    assert found.instead[0].start is waves.best.trial.fitted
