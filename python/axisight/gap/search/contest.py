@@ -90,9 +90,8 @@ def decided(context: Context, proposal: Proposal) -> Decision | None:
         # A loop that swings without end lacks them.
         return None
     contest = _Contest(context, proposal, without)
-    present = trial(proposal.gone[-1], model.ending_with(proposal.gone[-1]))
-    idle = sum(trial(f, model.ending_with(f)).idle for f in proposal.gone)
-    present = replace(present, also=proposal.gone[:-1], idle=idle)
+    each = [trial(f, model.ending_with(f)) for f in proposal.gone]
+    present = replace(each[-1], also=proposal.gone[:-1], idle=sum(t.idle for t in each))
     rivals = [t for one in proposal.instead if (t := contest.tried(rest, one)) is not None]
     if proposal.gone[:-1]:
         return contest.one_for(present, rivals)

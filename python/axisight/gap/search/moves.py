@@ -74,7 +74,7 @@ def _made(move: Move, context: Context, tried: set[tuple[frozenset[str], frozens
 
 
 def _take(name: str, context: Context, proposal: Proposal, decision: Decision) -> None:
-    """Take a set of causes into the state, fitted until it settles, with how what is new in it stood."""
+    """Take a set of causes into the state, with how what is new in it stood."""
     state, standing = context.state, decision.standing
     left, before = state.left(), {f.effect.label for f in state.model.free}
     if standing is not None and proposal.as_entered:

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from axisight.effects import effect_info
 from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.fit.held_out import linear_gain
 from axisight.gap.search.contest import Context, Proposal
-
-Array = NDArray[np.float64]
 
 
 def needless(context: Context) -> Iterator[Proposal]:
