@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
-import scipy.io
+import scipy
 
 from axisight.arguments import instance, path_of, short, shown
 from axisight.documents import parse_json, read_text

@@ -15,7 +15,7 @@ from axisight.fitting.simulation_error import is_closed_loop
 from axisight.gap.controller.speed_loop import with_integral
 from axisight.gap.facts.faults import Finding, flagged
 from axisight.gap.gate.log_only import check_log_alone
-from axisight.gap.prepare.log_start import begins, run_up_is_better
+from axisight.gap.prepare.log_start import begins, run_up_is_better, torque_is_from_rest
 from axisight.gap.prepare.run_up import NotRunUpError, begins_in_motion, run_up_to
 from axisight.gap.prepare.used_part import REST_S, stands
 from axisight.gap.signals.encoder_steps import encoder_steps
@@ -60,75 +60,87 @@ def from_rest(
         return given
     if not targets and not is_closed_loop(robot, logs):
         return given
-    moving = _moving(robot, logs, despite, simulates=not targets)
+    run_ups = _RunUps(robot, despite)
+    moving = _moving(run_ups, logs, simulates=not targets)
     if not any(moving):
         return given
     starts = [first_rest_s(log) if m else 0.0 for log, m in zip(logs, moving, strict=True)]
     if targets and any(s is None for s in starts):
         # The commands along them are not known yet: they are run up to where these are made, or refused.
         return given
-    try:
-        parts = [_from_start(robot, log, s, despite) for log, s in zip(logs, starts, strict=True)]
-    except NotRunUpError as error:
-        bare = [replace(log, velocity_ref_rad_s=None) for log in logs]
-        never = [log.name for log, s in zip(logs, starts, strict=True) if s is None]
-        n = len(estimation)
-        return Begun(bare[:n], bare[n:], list(simulated), (_without_references(never, error),))
+    parts: list[Log] = []
+    for log, start_s in zip(logs, starts, strict=True):
+        part = run_ups.from_start(log, start_s)
+        if isinstance(part, NotRunUpError):
+            bare = [replace(log, velocity_ref_rad_s=None) for log in logs]
+            never = [log.name for log, s in zip(logs, starts, strict=True) if s is None]
+            n = len(estimation)
+            findings = (_without_references(never, part),)
+            return Begun(bare[:n], bare[n:], list(simulated), findings)
+        parts.append(part)
     return _taken(given, parts)
 
 
-def _moving(
-    robot: Robot, logs: list[Log], despite: Collection[str], *, simulates: bool
-) -> list[bool]:
+def _moving(run_ups: _RunUps, logs: list[Log], *, simulates: bool) -> list[bool]:
     """Return which logs begin in motion; where positions leave it open, by what a simulation has of their torque.
 
     Where one does, others that leave it open do too: they were logged alike. At rest where it is open and
     none can be run up to them.
     """
+    robot = run_ups.robot
     noise = np.maximum(position_noise_std(logs), robot.position_noise_std)
     noise = np.maximum(noise, encoder_steps(robot, logs) / np.sqrt(12.0))
     how = [begins(log, noise) for log in logs]
-    moving = [one == "motion" for one in how]
-    if not simulates or "open" not in how:
-        return moving
-    open_logs = [log if one == "open" else None for log, one in zip(logs, how, strict=True)]
-    run_ups = [None if log is None else _run_up_of_open(robot, log, despite) for log in open_logs]
-    better = [
-        found is not None and run_up_is_better(robot, log, found)
-        for log, found in zip(logs, run_ups, strict=True)
+    left_open = [log for log, one in zip(logs, how, strict=True) if one == "open"]
+    moving = "motion" in how
+    if simulates and left_open:
+        moving = moving or any(run_ups.better_than_rest(log) for log in left_open)
+    return [
+        one == "motion"
+        or (one == "open" and simulates and moving and isinstance(run_ups.to(log), Log))
+        for log, one in zip(logs, how, strict=True)
     ]
-    if not any(moving) and not any(better):
-        return moving
-    return [m or found is not None for m, found in zip(moving, run_ups, strict=True)]
 
 
-def _run_up_of_open(robot: Robot, log: Log, despite: Collection[str]) -> Log | None:
-    try:
-        return _run_up(robot, log, despite)
-    except NotRunUpError:
-        return None
+class _RunUps:
+    """Logs of one simulator with a run-up, each made once."""
 
+    def __init__(self, robot: Robot, despite: Collection[str]) -> None:
+        self.robot, self.despite = robot, despite
+        self._made: dict[int, Log | NotRunUpError] = {}
 
-def _from_start(robot: Robot, log: Log, start_s: float | None, despite: Collection[str]) -> Log:
-    """Return a log from where it stands, at ``start_s``, or with a run-up where it never does.
+    def to(self, log: Log) -> Log | NotRunUpError:
+        """Return a log with a run-up, or why it can have none."""
+        if id(log) not in self._made:
+            try:
+                self._made[id(log)] = self._run_up(log)
+            except NotRunUpError as error:
+                self._made[id(log)] = error
+        return self._made[id(log)]
 
-    Raises NotRunUpError as `_run_up`.
-    """
-    if start_s is not None:
-        return log.part(start_s) if start_s else log
-    return _run_up(robot, log, despite)
+    def _run_up(self, log: Log) -> Log:
+        """Return a log with a run-up.
 
+        Raises NotRunUpError, also for a log with a fault: a simulation would go through what is cut off.
+        """
+        for fault in flagged(check_log_alone(log), self.despite):
+            if fault.severity == "refuse":
+                raise NotRunUpError(f"{log.name}: {fault.name} in {fault.field}")
+        kept = with_integral(self.robot).with_controller_speed(TRACKING_SPEED)
+        return run_up_to(self.robot, (self.robot, kept), log)
 
-def _run_up(robot: Robot, log: Log, despite: Collection[str]) -> Log:
-    """Return a log with a run-up.
+    def better_than_rest(self, log: Log) -> bool:
+        """Whether a simulation that is run up to a log does better than one from rest."""
+        if torque_is_from_rest(self.robot, log):
+            return False
+        run_up = self.to(log)
+        return isinstance(run_up, Log) and run_up_is_better(self.robot, log, run_up)
 
-    Raises NotRunUpError, also for a log with a fault: a simulation would go through what is cut off.
-    """
-    for fault in flagged(check_log_alone(log), despite):
-        if fault.severity == "refuse":
-            raise NotRunUpError(f"{log.name}: {fault.name} in {fault.field}")
-    kept = with_integral(robot).with_controller_speed(TRACKING_SPEED)
-    return run_up_to(robot, (robot, kept), log)
+    def from_start(self, log: Log, start_s: float | None) -> Log | NotRunUpError:
+        """Return a log from where it stands, at ``start_s``, or with a run-up where it never does."""
+        if start_s is not None:
+            return log.part(start_s) if start_s else log
+        return self.to(log)
 
 
 def _taken(given: Begun, parts: Sequence[Log]) -> Begun:

@@ -78,6 +78,18 @@ def _largest_acceleration(log: Log, n: int) -> Array:
     return np.asarray(np.abs(second).max(axis=0) / (half * log.sample_time_s) ** 2)
 
 
+def torque_is_from_rest(robot: Robot, log: Log) -> bool:
+    """Whether a log's first torque is that of a simulation from rest, for all that noise tells.
+
+    Whatever is missing, what stands has the torque of one that stands.
+    """
+    resting = _from_rest(robot, log, _few(log))
+    if resting is None:
+        return False
+    missed = ((log.torque_nm[: _few(log)] - resting) / _noise_nm(log))[:, _that_move(log)]
+    return bool(np.all(np.abs(missed.mean(axis=0)) < _NOISES / np.sqrt(len(missed))))
+
+
 def run_up_is_better(robot: Robot, log: Log, run_up: Log) -> bool:
     """Whether a log's torque has what a simulation that is run up to its first motion has beyond one from rest.
 
@@ -89,15 +101,25 @@ def run_up_is_better(robot: Robot, log: Log, run_up: Log) -> bool:
     references = run_up.led("velocity_ref_rad_s")[: lead + n]
     assert run_up.start_rad is not None  # it has a run-up
     moving = _first_torques(robot, references, run_up.start_rad, n)
-    at_rest = start_of(robot, log.position_rad[0])
-    resting = _first_torques(robot, references[lead:], at_rest, n)
+    resting = _from_rest(robot, log, n)
     if moving is None or resting is None:
         return moving is not None
     axes, noise = _that_move(log), _noise_nm(log)
     missed = ((log.torque_nm[:n] - resting) / noise)[:, axes]
     apart = ((moving - resting) / noise)[:, axes]
-    few = max(1, round(_LONGEST_S / log.sample_time_s))
-    return not _from_rest(missed[:few]) and _has(missed, apart, few)
+    return _has(missed, apart, _few(log))
+
+
+def _few(log: Log) -> int:
+    """Return the samples of a log in which a loop answers a step of its reference."""
+    return max(1, round(_LONGEST_S / log.sample_time_s))
+
+
+def _from_rest(robot: Robot, log: Log, n: int) -> Array | None:
+    """Return the first ``n`` torques (n, n_axes) [Nm] of a simulation from rest; None where it is unstable."""
+    assert log.velocity_ref_rad_s is not None  # closed loop only
+    at_rest = start_of(robot, log.position_rad[0])
+    return _first_torques(robot, log.velocity_ref_rad_s[:n], at_rest, n)
 
 
 def _first_torques(robot: Robot, references: Array, start_rad: Array, n: int) -> Array | None:
@@ -120,14 +142,6 @@ def _noise_nm(log: Log) -> Array:
     """Return the noise of torques (n_axes,) [Nm]; of one that has next to none, a share of the arm's."""
     size = log.torque_nm.std(axis=0).max()
     return np.maximum(white_std(log.torque_nm, log.sample_time_s), max(_NOISELESS * size, 1e-300))
-
-
-def _from_rest(first: Array) -> bool:
-    """Whether first errors (n, n_axes) of a simulation from rest, over their noise, are nothing but noise.
-
-    Whatever is missing, what stands has the torque of one that stands, but for what is constant.
-    """
-    return bool(np.all(np.abs(first.mean(axis=0)) < _NOISES / np.sqrt(len(first))))
 
 
 def _has(missed: Array, apart: Array, least: int) -> bool:

@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import scipy.stats
 from numpy.typing import NDArray
 
 from axisight.fitting.divergence import Diverged
@@ -19,6 +18,7 @@ from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.rank_deficiency import pseudo_inverse
 from axisight.gap.search.state import SearchState
+from axisight.statistics.intervals import student_factor
 
 Array = NDArray[np.float64]
 
@@ -109,7 +109,7 @@ def deviations(model: FittedModel) -> dict[tuple[int | None, str], float]:
     scatter = (count - 1) * without.var(axis=0)
     inverse = pseudo_inverse(whole)
     known = np.diag(inverse @ prior @ inverse)
-    quantile = float(scipy.stats.t.ppf(0.975, count - 1)) / _NORMAL
+    quantile = float(student_factor(0.95, count - 1)) / _NORMAL
     found = quantile * np.sqrt(scatter + known)
     return {
         **model.std,

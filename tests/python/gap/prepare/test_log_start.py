@@ -13,7 +13,7 @@ from test_run_up import QUICK, SECONDS, WITHHELD, rigid_axis, run_up, waves
 
 from axisight import Effect, Log, Robot, diagnose
 from axisight.gap.intake.start_of_logs import from_rest
-from axisight.gap.prepare.log_start import begins, run_up_is_better
+from axisight.gap.prepare.log_start import begins, run_up_is_better, torque_is_from_rest
 from axisight.logs import RunUp
 from gap_data import bare_axis, log_of, scattered
 
@@ -94,6 +94,12 @@ def beside_standing(log: Log, held_nm: float) -> Log:
     )
 
 
+def runs_on(robot: Robot, log: Log) -> bool:
+    """Whether a log is told to begin in motion, by a simulation from rest and one that is run up to it."""
+    from_rest = torque_is_from_rest(robot, log)
+    return not from_rest and run_up_is_better(robot, log, run_up(robot, log))
+
+
 @pytest.mark.parametrize("robot", [bare_axis(), rigid_axis()], ids=["elastic", "rigid"])
 def test_creeping_is_motion_and_standing_is_rest(robot: Robot) -> None:
     for withheld in ("none", "coulomb_friction"):
@@ -118,7 +124,7 @@ def test_a_step_from_rest_stays_one(kind: str, withheld: str) -> None:
     robot = bare_axis()
     log = at_once(robot, kind, withheld)
     assert begins(log, NOISE_RAD) == "open"
-    assert not run_up_is_better(robot, log, run_up(robot, log))
+    assert not runs_on(robot, log)
     found = from_rest(robot, [log], [log], [])
     assert found.estimation == [log] and not found.findings
 
@@ -127,7 +133,7 @@ def test_one_that_turns_round_is_run_up_to() -> None:
     robot = bare_axis()
     logs = turning_logs(robot, "none")
     assert {begins(x, NOISE_RAD) for x in logs} == {"open"}
-    assert all(run_up_is_better(robot, log, run_up(robot, log)) for log in logs)
+    assert all(runs_on(robot, log) for log in logs)
 
 
 # Larger than what turns the motor round, of torques with a deviation of 5 Nm.
@@ -147,10 +153,10 @@ def test_what_is_missing_of_both_simulations_does_not_hide_that_it_turns_round(
     monkeypatch.setitem(WITHHELD, missing, [LARGE[missing]])
     for log in turning_logs(robot, missing):
         assert begins(log, NOISE_RAD) == "open"
-        assert run_up_is_better(robot, log, run_up(robot, log))
+        assert runs_on(robot, log)
     for kind in ("step", "rise"):
         log = at_once(robot, kind, missing)
-        assert not run_up_is_better(robot, log, run_up(robot, log))
+        assert not runs_on(robot, log)
 
 
 @pytest.mark.parametrize("held_nm", [0.0, 0.5, 4.0])
@@ -161,7 +167,7 @@ def test_axes_that_stand_do_not_tell(held_nm: float) -> None:
     two = with_a_second_axis(one)
     for log, better in ((turning, True), (stepping, False)):
         wide = beside_standing(log, held_nm)
-        assert run_up_is_better(two, wide, run_up(two, wide)) == better
+        assert runs_on(two, wide) == better
 
 
 @pytest.mark.parametrize("cut", [1, 2])
