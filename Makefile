@@ -62,10 +62,11 @@ test: test-rust test-python
 test-rust:
 	$(CARGO) test --release --locked --no-fail-fast $(RUST_TESTS)
 
-# What the site needs is installed for its tests, which are skipped without.
+# What the site needs is installed for its tests, which are skipped without. Threads of the linear algebra
+# would wait for one another: files run beside one another instead.
 test-python: $(STAMPS)/test-tools $(STAMPS)/docs-tools
 	$(BIN)/python -m mypy.stubtest axisight._core
-	$(BIN)/pytest --numprocesses $(JOBS) --dist loadfile
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses $(JOBS) --dist loadfile
 
 lint: $(STAMPS)/test-tools
 	$(CARGO) fmt --all --check

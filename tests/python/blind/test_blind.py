@@ -41,20 +41,30 @@ from axisight.blind.score import _missed, _said, comparable, sizes
 from axisight.blind.sealed import SEAL
 from axisight.cli import app
 
+IRB = "irb6600_like"
+
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    return load_robot("irb6600_like").with_effects([])
+    return load_robot(IRB).with_effects([])
 
 
 RUN = {"mujoco": mujoco_engine.run, "pinocchio": pinocchio_engine.run}
+# In which every kind of gap shows in the torque [s].
+LOOK_S = 0.5
 KINDS = [(engine, name) for engine, kinds in ENGINES.items() for name in kinds]
 
 
-def short(robot: Robot, seconds: float = 1.0) -> np.ndarray:
-    """A second of a multisine on all axes, (n, n_axes)."""
-    _, reference = multisines(np.random.default_rng(3), robot)["multisine_fresh"]
-    return reference[: round(seconds / robot.sample_time_s)]
+@cache
+def multisine(name: str) -> np.ndarray:
+    """A multisine on all axes of a preset, (n, n_axes)."""
+    _, reference = multisines(np.random.default_rng(3), load_robot(name))["multisine_fresh"]
+    return reference
+
+
+def short(preset: str, seconds: float = 1.0) -> np.ndarray:
+    """The first second of it."""
+    return multisine(preset)[: round(seconds / load_robot(preset).sample_time_s)]
 
 
 def torque_of(engine: str, machine: Machine, reference: np.ndarray) -> np.ndarray:
@@ -66,8 +76,8 @@ def torque_of(engine: str, machine: Machine, reference: np.ndarray) -> np.ndarra
 @cache
 def bare_torque(engine: str) -> np.ndarray:
     """Torque of the preset without effects along the reference that all kinds are tried on."""
-    robot = load_robot("irb6600_like")
-    return torque_of(engine, Machine(robot), 1.5 * short(robot, 0.5))
+    robot = load_robot(IRB)
+    return torque_of(engine, Machine(robot), 1.5 * short(IRB, LOOK_S))
 
 
 # MuJoCo holds a mass of a milligram in bodies that have none, and settles before it begins: its slowest
@@ -87,7 +97,7 @@ def bare_torque(engine: str) -> np.ndarray:
 )
 def test_without_effects_the_other_engines_agree_with_ours(engine: str, arm: str, apart: float):
     machine = scattered(np.random.default_rng(1), load_robot(arm))
-    reference = short(machine)
+    reference = short(arm)
     ((torque, angle),) = RUN[engine](Machine(machine), [reference], [np.zeros_like(reference)])
     ours = simulate(machine, reference)
     spread = np.std(ours["torque_cmd_nm"].values, axis=0)
@@ -98,7 +108,7 @@ def test_without_effects_the_other_engines_agree_with_ours(engine: str, arm: str
 
 @pytest.mark.parametrize(("engine", "name"), KINDS)
 def test_every_kind_changes_the_torque(engine: str, name: str, robot: Robot):
-    reference = 1.5 * short(robot, 0.5)
+    reference = 1.5 * short(IRB, LOOK_S)
     kind, scene = ENGINES[engine][name], Scene(robot, [reference])
     axes = kind.axes(scene)
     drawn = kind.draw(np.random.default_rng(5), scene, 2 if 2 in axes else axes[0])
@@ -168,7 +178,7 @@ def test_every_kind_changes_the_torque(engine: str, name: str, robot: Robot):
 def test_what_has_one_formula_only_is_what_ours_is(
     native: Native, laws: list[Formula], ours: Effect, robot: Robot
 ):
-    reference = short(robot, 0.5)
+    reference = short(IRB, 0.5)
     machine = Machine(robot, {0: native}, laws={0: laws})
     torque = torque_of("pinocchio", machine, reference)
     expected = simulate(robot, reference, effects=[ours])["torque_cmd_nm"].values
@@ -180,7 +190,7 @@ def test_what_has_one_formula_only_is_what_ours_is(
 
 @pytest.mark.parametrize("engine", sorted(RUN))
 def test_a_machine_with_a_fast_clock_is_ours(engine: str, robot: Robot):
-    reference = short(robot, 0.5)
+    reference = short(IRB, 0.5)
     fast = Effect("clock_drift", None, {"relative_rate": 8e-3})
     torque = torque_of(engine, Machine(robot, fast=8e-3), reference)
     expected = simulate(robot, reference, effects=[fast])["torque_cmd_nm"].values
@@ -192,7 +202,7 @@ def test_a_machine_with_a_fast_clock_is_ours(engine: str, robot: Robot):
 
 @pytest.mark.parametrize("engine", sorted(RUN))
 def test_a_gear_that_is_turned_along_is_ours_in_every_engine(engine: str, robot: Robot):
-    reference = short(robot, 0.5)
+    reference = short(IRB, 0.5)
     coupled = Effect("axis_coupling", None, {"share": 0.1}, (2, 3))
     torque = torque_of(engine, Machine(robot, {1: Native(turns_next=0.1)}), reference)
     expected = simulate(robot, reference, effects=[coupled])["torque_cmd_nm"].values
@@ -202,7 +212,7 @@ def test_a_gear_that_is_turned_along_is_ours_in_every_engine(engine: str, robot:
 
 
 def test_runs_of_a_machine_do_not_feel_one_another(robot: Robot):
-    reference = short(robot, 0.2)
+    reference = short(IRB, 0.2)
     others = [0.5 * reference, reference, -reference]
     drawn = ENGINES["pinocchio"]["coulomb_friction"].draw(
         np.random.default_rng(5), Scene(robot, others), 1
@@ -214,7 +224,7 @@ def test_runs_of_a_machine_do_not_feel_one_another(robot: Robot):
 
 
 def test_an_engine_refuses_what_it_has_no_formula_for(robot: Robot):
-    reference = short(robot, 0.1)
+    reference = short(IRB, 0.1)
     with pytest.raises(InputError, match="play and dry friction as formulas"):
         torque_of("pinocchio", Machine(robot, {0: Native(friction_nm=0.3)}), reference)
     with pytest.raises(InputError, match="expected a Formula of this engine, got Delay"):

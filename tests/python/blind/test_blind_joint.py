@@ -1,5 +1,7 @@
 """What hangs on joints and how bases stand, in every engine: where there is one formula only, ours."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -17,16 +19,18 @@ from axisight.blind.motions import multisines
 
 RUN = {"mujoco": mujoco_engine.run, "pinocchio": pinocchio_engine.run}
 MODE = {"inertia_kg_m2": 60.0, "frequency_hz": 14.0, "damping": 0.04}
+IRB = "irb6600_like"
 UPRIGHT = {"sine_nm": 900.0, "cosine_nm": -300.0}
 
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    return load_robot("irb6600_like")
+    return load_robot(IRB)
 
 
-def excitation(robot: Robot) -> np.ndarray:
-    _, reference = multisines(np.random.default_rng(3), robot)["multisine_fresh"]
+@cache
+def excitation() -> np.ndarray:
+    _, reference = multisines(np.random.default_rng(3), load_robot(IRB))["multisine_fresh"]
     return reference[:1000]
 
 
@@ -75,14 +79,14 @@ def test_what_has_one_formula_only_is_what_ours_is(
     """Engines settle for a second under the controller before they begin, of a constant torque some hundredths
     are still to come; and MuJoCo holds torques of laws over half a sample."""
     machine = Machine(robot, laws={1: [law]})
-    assert off(engine, machine, [ours], excitation(robot)) < 0.05
+    assert off(engine, machine, [ours], excitation()) < 0.05
 
 
 @pytest.mark.parametrize("engine", sorted(RUN))
 def test_a_base_that_stands_tilted_is_ours(engine: str, robot: Robot):
     tilted = Effect("base_tilt", None, {"about_x_rad": 0.03, "about_y_rad": -0.05})
     machine = Machine(robot, ends=Ends(tilted_rad=(0.03, -0.05)))
-    assert off(engine, machine, [tilted], excitation(robot)) < 0.02
+    assert off(engine, machine, [tilted], excitation()) < 0.02
 
 
 def place(speed: float) -> formulas.Place:
