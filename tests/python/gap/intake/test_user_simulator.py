@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 import rigid_arm
-from axisight import Effect, Log, Robot, Settings, diagnose, load_robot, simulate
+from axisight import Diagnosis, Effect, Log, Robot, Settings, diagnose, load_robot, simulate
 from axisight.cli import app
 from axisight.errors import InputError
 from axisight.explore.session import Session, Version
@@ -66,10 +66,14 @@ def theirs(robot: Robot) -> list[Log]:
     return logs_of(robot, [THEIRS], 10)
 
 
+@pytest.fixture(scope="module")
+def plain(robot: Robot, real: list[Log]) -> Diagnosis:
+    return diagnose(robot=robot, estimation=real[:2], validation=real[2:])
+
+
 def test_what_the_model_lacks_of_the_simulator_is_no_cause(
-    robot: Robot, real: list[Log], theirs: list[Log]
+    robot: Robot, real: list[Log], theirs: list[Log], plain: Diagnosis
 ) -> None:
-    plain = diagnose(robot=robot, estimation=real[:2], validation=real[2:])
     assert {c.label for c in plain.causes} == {THEIRS.label, MACHINES.label}
     found = diagnose(robot=robot, estimation=real[:2], validation=real[2:], simulated=theirs)
     assert [c.label for c in found.causes] == [MACHINES.label]
@@ -90,13 +94,14 @@ def test_what_the_model_lacks_of_the_simulator_is_no_cause(
     assert left[2] < 0.5 * seen.held_gap()[2]
 
 
-def test_a_model_that_is_the_simulator_changes_nothing(robot: Robot, real: list[Log]) -> None:
+def test_a_model_that_is_the_simulator_changes_nothing(
+    robot: Robot, real: list[Log], plain: Diagnosis
+) -> None:
     """Their logs without noise are the model's own, but for rounding."""
     own = [
         replace(x, torque_nm=run["torque_cmd_nm"].values, position_rad=run["position_rad"].values)
         for x, run in zip(real, exact(robot), strict=True)
     ]
-    plain = diagnose(robot=robot, estimation=real[:2], validation=real[2:])
     found = diagnose(robot=robot, estimation=real[:2], validation=real[2:], simulated=own)
     assert found.simulator is not None
     assert found.simulator.per_axis.max() < 1e-9
