@@ -40,6 +40,10 @@ class Field(Protocol):
         """The fitter for part of the data; None where that is all."""
 
     @property
+    def screened(self) -> FittedModel:
+        """The model as that part of the data has it."""
+
+    @property
     def skipped(self) -> dict[str, str]:
         """Candidates that failed, with the reason."""
 
@@ -115,8 +119,8 @@ class Restarts:
         leader, option, values = one
         part = self.round.rough or self.round.fitter
         if part is not self.round.fitter:
-            # Its sensitivities are those of all of the data.
-            leader = replace(leader, columns={})
+            # Its sensitivities are those of all of the data; what both have beside it hardly differs.
+            leader = replace(leader, columns=self.round.screened.columns)
         at = part.evaluate([*leader.free[:-1], option], leader, robot_values=values)
         return float("inf") if isinstance(at, Diverged) else at.total - linear_gain(at)
 

@@ -126,6 +126,11 @@ class SearchRound:
         return None if part is self.bench else part.fitter
 
     @property
+    def screened(self) -> FittedModel:
+        """The model as the part of the data has it that candidates are screened on."""
+        return self.screen.model
+
+    @property
     def skipped(self) -> dict[str, str]:
         """Candidates that failed, with the reason."""
         return self.bench.skipped
