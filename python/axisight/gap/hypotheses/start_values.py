@@ -225,10 +225,10 @@ _SLIPS = (0.1, 0.4, 1.6)
 def _slip(trial: StartContext) -> Hypothesis:
     """Begin at several deflections at which the gear slips."""
     name, deflection = "deflection_rad", _deflection_rad(trial)
-    starts = tuple({name: share * deflection} for share in _SLIPS)
-    bounds = {name: (0.1 * starts[0][name], 10 * starts[-1][name])}
+    less, first, *more = ({name: share * deflection} for share in _SLIPS)
+    bounds = {name: (0.1 * _SLIPS[0] * deflection, 10 * _SLIPS[-1] * deflection)}
     begin = trial.effect(
-        {"share": 0.0, "included": 0.5, "sharpness": 0.5, "strain_at_rest": 0.0, **starts[1]}
+        {"share": 0.0, "included": 0.5, "sharpness": 0.5, "strain_at_rest": 0.0, **first}
     )
     # Stiffness comes from small motions, which feel the whole spring, or from large ones.
     return Hypothesis(
@@ -236,7 +236,7 @@ def _slip(trial: StartContext) -> Hypothesis:
         ("share", name, "included", "sharpness", "strain_at_rest"),
         {"included": (0.5, 0.5), "sharpness": (0.5, 0.5), "strain_at_rest": (0.0, 0.5)},
         bounds,
-        starts=(starts[0], starts[2]),
+        starts=(less, *more),
     )
 
 

@@ -22,9 +22,9 @@ from axisight.gap.ranking.likelihood import (
     PARAMETER_COST,
     nats_by_loss,
 )
-from axisight.gap.ranking.own_parameters import price_of_bending
 from axisight.gap.ranking.plainer_law import held_to_plainer
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis, in_order
+from axisight.gap.ranking.price_of_bending import price_of_bending
 
 Array = NDArray[np.float64]
 

@@ -80,10 +80,6 @@ def inflation(model: FittedModel) -> Array:
     return out
 
 
-# Of a normal distribution, by which standard deviations become intervals.
-_NORMAL = 1.96
-
-
 def deviations(model: FittedModel) -> dict[tuple[int | None, str], float]:
     """Return the standard deviation of every parameter as if there were many stretches of time.
 
@@ -109,7 +105,8 @@ def deviations(model: FittedModel) -> dict[tuple[int | None, str], float]:
     scatter = (count - 1) * without.var(axis=0)
     inverse = pseudo_inverse(whole)
     known = np.diag(inverse @ prior @ inverse)
-    quantile = float(student_factor(0.95, count - 1)) / _NORMAL
+    # Intervals are made as of a normal distribution.
+    quantile = float(student_factor(0.95, count - 1) / student_factor(0.95, np.inf))
     found = quantile * np.sqrt(scatter + known)
     return {
         **model.std,

@@ -7,38 +7,32 @@ sure. Together both are.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import Effect, effect_info
-from axisight.fitting.divergence import Diverged
+from axisight.effects import effect_info
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.data_blocks import Layout
-from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
+from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.ranking.drive_lags import is_lag
-from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, trial
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.judgement import stand
-from axisight.gap.ranking.likelihood import clearly_worse
-from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.screening.restart_look_alike import ended_at_bound
+from axisight.gap.search.composites import SHOWS_BESIDE, Found, all_tried, parts_of, tried
 from axisight.statistics.tails import normal_deviate
 
 Array = NDArray[np.float64]
-Found = tuple[RankedHypothesis, AxisPosterior]
 
 # Candidates of an axis that are tried in pairs.
 _PARTNERS = 4
 # Share of what is left that each of them explains alone, of what a cause has to: below, there is
 # nothing that hides.
 _HINT = 0.2
-# What each of a pair that is a cause together has to show beside the other: the pair has passed
-# the test of the whole family, its two members are held against one another.
-_OF_TWO = normal_deviate(0.025)
 
 
 @dataclass(frozen=True)
@@ -129,14 +123,13 @@ class Pairs:
     def _parts(self, composite: FittedHypothesis, known: set[str]) -> list[FittedHypothesis]:
         """Return the parts of a composite that are not known, each on top of the model."""
         effect, bounds = composite.fitted.effects[-1], composite.hypothesis.bounds
-        free = [_part(name, effect, bounds) for name in effect_info(effect.name).parts]
-        new = [f for f in free if _new(f, known)]
-        return _all(_tried(self.fitter, [*self.model.free, f], self.model) for f in new) or []
+        free = parts_of(effect, bounds, known)
+        return all_tried(tried(self.fitter, [*self.model.free, f], self.model) for f in free) or []
 
     def _both(self, one: FittedHypothesis, other: FittedHypothesis) -> FittedHypothesis | None:
         """Return ``other`` on top of the model with ``one``; None if it cannot be simulated."""
         free = [*one.fitted.free, other.hypothesis]
-        return _tried(self.fitter, free, one.fitted, lazy=True)
+        return tried(self.fitter, free, one.fitted, lazy=True)
 
     def _beside(
         self, one: str, partner: str, mine: Sequence[FittedHypothesis], axis: int
@@ -157,105 +150,10 @@ class Pairs:
         if standing is None or standing.best.trial.label != one:
             return None
         sure = self.layout.significance(base.held_out, standing.best.trial.held_out, axis)
-        return (standing.best, standing) if sure > _OF_TWO else None
+        return (standing.best, standing) if sure > SHOWS_BESIDE else None
 
 
 def _nested(one: FittedHypothesis, other: FittedHypothesis) -> bool:
     """Whether one of two effects contains the other."""
     a, b = one.hypothesis.effect.name, other.hypothesis.effect.name
     return a in effect_info(b).contains or b in effect_info(a).contains
-
-
-def without_rival_composites(standing: AxisPosterior) -> AxisPosterior:
-    """Return the standing with the winner in the place of composites that it is a part of.
-
-    Whether their other part is there too is a question of its own, asked once the winner is in.
-    """
-    winner = standing.best.trial.hypothesis.effect
-    composed = [
-        r
-        for r in standing.ranked[1:]
-        if winner.name in effect_info(r.trial.hypothesis.effect.name).parts
-        and r.trial.hypothesis.effect.axis == winner.axis
-    ]
-    return standing.joined(standing.best, [standing.best, *composed]) if composed else standing
-
-
-def in_parts(
-    standing: AxisPosterior, fitter: ModelFitter, model: FittedModel, layout: Layout
-) -> tuple[Found, ...]:
-    """Return the parts of a composite that leads an axis, where they do as well; else none.
-
-    Those of its two parts that show beside the other: an asymmetric friction may be a Coulomb
-    friction and an offset, or one of them.
-    """
-    winner = standing.best
-    effect = winner.trial.hypothesis.effect
-    parts = effect_info(effect.name).parts
-    if not parts:
-        return ()
-    bounds = winner.trial.hypothesis.bounds
-    present = {e.label for e in model.effects}
-    free = [f for f in (_part(name, effect, bounds) for name in parts) if _new(f, present)]
-    alone = _all(_tried(fitter, [*model.free, f], model) for f in free)
-    both = alone
-    if alone is not None and len(free) == 2:
-        both = _all(
-            _tried(fitter, [*model.free, g, f], beside.fitted, lazy=True)
-            for f, g, beside in zip(free, free[::-1], alone[::-1], strict=True)
-        )
-    if not alone or not both:
-        return ()
-    if clearly_worse(float(both[0].held_out.sum()), float(winner.trial.held_out.sum())):
-        return ()
-    chosen = _needed(alone, both, layout, standing.axis)
-    labels = {t.label for t in both} | {winner.trial.label}
-    same = [r for r in standing.ranked if r.trial.label in labels]
-    joined = [standing.joined(replace(winner, trial=t), same) for t in chosen]
-    return tuple((led.best, led) for led in joined)
-
-
-def _tried(
-    fitter: ModelFitter, free: Sequence[Hypothesis], start: FittedModel, *, lazy: bool = False
-) -> FittedHypothesis | None:
-    """Return the last of the effects ``free`` beside the others; None if it cannot be simulated."""
-    found = fitter.fit(free, start, lazy=lazy)
-    return None if isinstance(found, Diverged) else trial(free[-1], found)
-
-
-def _all(tried: Iterable[FittedHypothesis | None]) -> list[FittedHypothesis] | None:
-    """Return trials as far as all can be simulated; None from the first that cannot."""
-    found = []
-    for one in tried:
-        if one is None:
-            return None
-        found.append(one)
-    return found
-
-
-def _new(part: Hypothesis, present: set[str]) -> bool:
-    return part.effect.label not in present
-
-
-def _needed(
-    alone: Sequence[FittedHypothesis], both: Sequence[FittedHypothesis], layout: Layout, axis: int
-) -> Sequence[FittedHypothesis]:
-    """Return the trials of those parts that show beside the other; the first if none does."""
-    if len(both) < 2:
-        return both
-    sure = [
-        layout.significance(beside.held_out, t.held_out, axis) > _OF_TWO
-        for beside, t in zip(alone[::-1], both, strict=True)
-    ]
-    if all(sure):
-        return both
-    return [alone[1]] if sure[1] else [alone[0]]
-
-
-def _part(name: str, composite: Effect, bounds: Mapping[str, tuple[float, float]]) -> Hypothesis:
-    """Return a part of a composite, with the shape that the composite has."""
-    given = composite.parameters or {}
-    info = effect_info(name).parameters
-    values = {p.name: given.get(p.name, p.neutral) for p in info}
-    shared = {p.name: bounds[p.name] for p in info if p.name in bounds}
-    return Hypothesis(Effect(name, composite.axis, values), tuple(values), bounds=shared)

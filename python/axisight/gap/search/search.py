@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import Effect, effect_info
 from axisight.fitting.divergence import Diverged, must_hold
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.data_blocks import layout_of
@@ -17,15 +16,16 @@ from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.settling import settled
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, falls
-from axisight.gap.ranking.likelihood import FORMULA_ERROR, clearly_worse
+from axisight.gap.ranking.likelihood import FORMULA_ERROR
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.screening.column_cache import ColumnCache
 from axisight.gap.screening.promise import HOPELESS
 from axisight.gap.screening.screening import kept_beside
 from axisight.gap.screening.search_round import Progress, SearchRound, fresh, interact
+from axisight.gap.search.composites import named_simply
 from axisight.gap.search.contest import Context
 from axisight.gap.search.moves import AFTER_EACH_ROUND, AT_THE_END, finish, make
-from axisight.gap.search.pairs import Pairs, in_parts, without_rival_composites
+from axisight.gap.search.pairs import Pairs
 from axisight.gap.search.state import OPEN, Round, SearchState
 from axisight.statistics.tails import normal_deviate
 
@@ -161,7 +161,7 @@ def _taken(
         )
         if not felt and _earns_its_gain(round_.fitter, led.best, state.model, least[led.axis]):
             leaders.append((mine, led.axis))
-            found += _named_simply(led, round_.fitter, state)
+            found += named_simply(led, round_.fitter, state)
     if not found and round_.fitter.adds_up:
         found = _pairs(round_, trials, state, settings, tried)
     return tuple(found)
@@ -214,17 +214,6 @@ def _leads(led: AxisPosterior, other: AxisPosterior, fall: Array, least: Array) 
     """Whether what leads a standing also leads another, by what a cause takes away there."""
     same = other.best.trial is led.best.trial
     return other.axis != led.axis and same and bool(fall[other.axis] > least[other.axis])
-
-
-def _named_simply(
-    led: AxisPosterior, fitter: ModelFitter, state: SearchState
-) -> Sequence[tuple[RankedHypothesis, AxisPosterior]]:
-    """Return the cause that leads a standing, or what it is made of where that does as well."""
-    if fitter.adds_up:
-        whole = without_rival_composites(led)
-        return in_parts(led, fitter, state.model, state.layout) or ((whole.best, whole),)
-    simpler = _simpler(led, fitter)
-    return ((simpler.best, simpler),)
 
 
 def _pairs(
@@ -318,39 +307,6 @@ def _take_in(
     state.moved("add", found)
     progress(label, 1, 1)
     return None
-
-
-def _first_part(standing: AxisPosterior) -> RankedHypothesis | None:
-    """Return the rival that is the first part of a winner which simpler effects imitate."""
-    effect = standing.best.trial.hypothesis.effect
-    parts = effect_info(effect.name).parts
-    if not parts:
-        return None
-    label = Effect(parts[0], effect.axis).label
-    return next((r for r in standing.ranked if r.trial.label == label), None)
-
-
-def _simpler(standing: AxisPosterior, fitter: ModelFitter) -> AxisPosterior:
-    """Return a standing led by the first part of a composite winner, where parts do nearly as well or better.
-
-    Where the first does nearly as well alone, the composite stays a rival. Where it takes both parts, one cause is
-    likelier than two: it has to leave clearly more than they do.
-    """
-    part = _first_part(standing)
-    if part is None:
-        return standing
-    if any(r is part for r in standing.inseparable()):
-        return standing.led_by(part, "simplest_first")
-    winner = standing.best
-    effect = winner.trial.hypothesis.effect
-    second = effect_info(effect.name).parts[1]
-    other = Hypothesis(Effect(second, effect.axis), (effect_info(second).parameters[0].name,))
-    both = fitter.fit([*part.trial.fitted.free, other], part.trial.fitted, lazy=True)
-    if isinstance(both, Diverged):
-        return standing
-    if clearly_worse(float(winner.trial.held_out.sum()), float(held_out_loss(both).sum())):
-        return standing.joined(part, [part, standing.best])
-    return standing
 
 
 def _earns_its_gain(

@@ -9,9 +9,9 @@ from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, trial
 from axisight.gap.ranking.likelihood import likelier
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
+from axisight.gap.search.composites import _simpler
 from axisight.gap.search.contest import Context, decided
 from axisight.gap.search.one_for_several import merged, several_together
-from axisight.gap.search.search import _simpler
 from axisight.gap.search.state import SearchState
 from axisight.gap.views.closed_loop import ClosedLoopView
 from gap_data import bare_axis, log_of, logs_of, reference

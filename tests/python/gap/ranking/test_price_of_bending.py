@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from axisight.gap.fit.fitted_model import FittedModel
-from axisight.gap.ranking.own_parameters import price_of_bending
+from axisight.gap.ranking.price_of_bending import price_of_bending
 from gap_data import linear_evidence
 
 N_BLOCKS = 40

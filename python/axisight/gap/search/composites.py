@@ -1,0 +1,168 @@
+"""Composites and their parts: which of them a gap is named by.
+
+A friction that is larger one way is a dry friction and an offset. Where one of these, or both, do as well, a composite
+is not what is missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from axisight.effects import Effect, effect_info
+from axisight.fitting.divergence import Diverged
+from axisight.gap.fit.data_blocks import Layout
+from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
+from axisight.gap.fit.held_out import held_out_loss
+from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, trial
+from axisight.gap.ranking.likelihood import clearly_worse
+from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
+from axisight.gap.search.state import SearchState
+from axisight.statistics.tails import normal_deviate
+
+Found = tuple[RankedHypothesis, AxisPosterior]
+
+SHOWS_BESIDE = normal_deviate(0.025)
+"""What each of a pair that is a cause together has to show beside the other [standard deviations]: the pair has passed
+the test of the whole family, its two members are held against one another."""
+
+
+def named_simply(led: AxisPosterior, fitter: ModelFitter, state: SearchState) -> Sequence[Found]:
+    """Return the cause that leads a standing, or what it is made of where that does as well."""
+    if fitter.adds_up:
+        whole = _without_rival_composites(led)
+        return _in_parts(led, fitter, state.model, state.layout) or ((whole.best, whole),)
+    simpler = _simpler(led, fitter)
+    return ((simpler.best, simpler),)
+
+
+def _first_part(standing: AxisPosterior) -> RankedHypothesis | None:
+    """Return the rival that is the first part of a winner which simpler effects imitate."""
+    effect = standing.best.trial.hypothesis.effect
+    parts = effect_info(effect.name).parts
+    if not parts:
+        return None
+    label = Effect(parts[0], effect.axis).label
+    return next((r for r in standing.ranked if r.trial.label == label), None)
+
+
+def _simpler(standing: AxisPosterior, fitter: ModelFitter) -> AxisPosterior:
+    """Return a standing led by the first part of a composite winner, where parts do nearly as well or better.
+
+    Where the first does nearly as well alone, the composite stays a rival. Where it takes both parts, one cause is
+    likelier than two: it has to leave clearly more than they do.
+    """
+    part = _first_part(standing)
+    if part is None:
+        return standing
+    if any(r is part for r in standing.inseparable()):
+        return standing.led_by(part, "simplest_first")
+    winner = standing.best
+    effect = winner.trial.hypothesis.effect
+    second = effect_info(effect.name).parts[1]
+    other = Hypothesis(Effect(second, effect.axis), (effect_info(second).parameters[0].name,))
+    both = fitter.fit([*part.trial.fitted.free, other], part.trial.fitted, lazy=True)
+    if isinstance(both, Diverged):
+        return standing
+    if clearly_worse(float(winner.trial.held_out.sum()), float(held_out_loss(both).sum())):
+        return standing.joined(part, [part, standing.best])
+    return standing
+
+
+def _without_rival_composites(standing: AxisPosterior) -> AxisPosterior:
+    """Return the standing with the winner in the place of composites that it is a part of.
+
+    Whether their other part is there too is a question of its own, asked once the winner is in.
+    """
+    winner = standing.best.trial.hypothesis.effect
+    composed = [
+        r
+        for r in standing.ranked[1:]
+        if winner.name in effect_info(r.trial.hypothesis.effect.name).parts
+        and r.trial.hypothesis.effect.axis == winner.axis
+    ]
+    return standing.joined(standing.best, [standing.best, *composed]) if composed else standing
+
+
+def _in_parts(
+    standing: AxisPosterior, fitter: ModelFitter, model: FittedModel, layout: Layout
+) -> tuple[Found, ...]:
+    """Return the parts of a composite that leads an axis, where they do as well; else none.
+
+    Those of its two parts that show beside the other: an asymmetric friction may be a Coulomb
+    friction and an offset, or one of them.
+    """
+    winner = standing.best
+    effect = winner.trial.hypothesis.effect
+    parts = effect_info(effect.name).parts
+    if not parts:
+        return ()
+    present = {e.label for e in model.effects}
+    free = parts_of(effect, winner.trial.hypothesis.bounds, present)
+    alone = all_tried(tried(fitter, [*model.free, f], model) for f in free)
+    both = alone
+    if alone is not None and len(free) == 2:
+        both = all_tried(
+            tried(fitter, [*model.free, g, f], beside.fitted, lazy=True)
+            for f, g, beside in zip(free, free[::-1], alone[::-1], strict=True)
+        )
+    if not alone or not both:
+        return ()
+    if clearly_worse(float(both[0].held_out.sum()), float(winner.trial.held_out.sum())):
+        return ()
+    chosen = _needed(alone, both, layout, standing.axis)
+    labels = {t.label for t in both} | {winner.trial.label}
+    same = [r for r in standing.ranked if r.trial.label in labels]
+    joined = [standing.joined(replace(winner, trial=t), same) for t in chosen]
+    return tuple((led.best, led) for led in joined)
+
+
+def _needed(
+    alone: Sequence[FittedHypothesis], both: Sequence[FittedHypothesis], layout: Layout, axis: int
+) -> Sequence[FittedHypothesis]:
+    """Return the trials of those parts that show beside the other; the first if none does."""
+    if len(both) < 2:
+        return both
+    sure = [
+        layout.significance(beside.held_out, t.held_out, axis) > SHOWS_BESIDE
+        for beside, t in zip(alone[::-1], both, strict=True)
+    ]
+    if all(sure):
+        return both
+    return [alone[1]] if sure[1] else [alone[0]]
+
+
+def parts_of(
+    composite: Effect, bounds: Mapping[str, tuple[float, float]], known: Collection[str]
+) -> list[Hypothesis]:
+    """Return the parts of a composite whose labels are not known, with the shape that the composite has."""
+    free = [_part(name, composite, bounds) for name in effect_info(composite.name).parts]
+    return [f for f in free if f.effect.label not in known]
+
+
+def tried(
+    fitter: ModelFitter, free: Sequence[Hypothesis], start: FittedModel, *, lazy: bool = False
+) -> FittedHypothesis | None:
+    """Return the last of the effects ``free`` beside the others; None if it cannot be simulated."""
+    found = fitter.fit(free, start, lazy=lazy)
+    return None if isinstance(found, Diverged) else trial(free[-1], found)
+
+
+def all_tried(trials: Iterable[FittedHypothesis | None]) -> list[FittedHypothesis] | None:
+    """Return trials as far as all can be simulated; None from the first that cannot."""
+    found = []
+    for one in trials:
+        if one is None:
+            return None
+        found.append(one)
+    return found
+
+
+def _part(name: str, composite: Effect, bounds: Mapping[str, tuple[float, float]]) -> Hypothesis:
+    """Return a part of a composite, with the shape that the composite has."""
+    given = composite.parameters or {}
+    info = effect_info(name).parameters
+    values = {p.name: given.get(p.name, p.neutral) for p in info}
+    shared = {p.name: bounds[p.name] for p in info if p.name in bounds}
+    return Hypothesis(Effect(name, composite.axis, values), tuple(values), bounds=shared)
