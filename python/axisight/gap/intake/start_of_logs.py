@@ -107,16 +107,16 @@ class _RunUps:
 
     def __init__(self, robot: Robot, despite: Collection[str]) -> None:
         self.robot, self.despite = robot, despite
-        self._made: dict[int, Log | NotRunUpError] = {}
+        self._made: dict[Log, Log | NotRunUpError] = {}
 
     def to(self, log: Log) -> Log | NotRunUpError:
         """Return a log with a run-up, or why it can have none."""
-        if id(log) not in self._made:
+        if log not in self._made:
             try:
-                self._made[id(log)] = self._run_up(log)
+                self._made[log] = self._run_up(log)
             except NotRunUpError as error:
-                self._made[id(log)] = error
-        return self._made[id(log)]
+                self._made[log] = error
+        return self._made[log]
 
     def _run_up(self, log: Log) -> Log:
         """Return a log with a run-up.
@@ -130,8 +130,14 @@ class _RunUps:
         return run_up_to(self.robot, (self.robot, kept), log)
 
     def better_than_rest(self, log: Log) -> bool:
-        """Whether a simulation that is run up to a log does better than one from rest."""
-        if torque_is_from_rest(self.robot, log):
+        """Whether a simulation that is run up to a log does better than one from rest.
+
+        Not along a log that no simulation goes along: what is wrong with it is the gate's to say.
+        """
+        try:
+            if torque_is_from_rest(self.robot, log):
+                return False
+        except InputError:
             return False
         run_up = self.to(log)
         return isinstance(run_up, Log) and run_up_is_better(self.robot, log, run_up)

@@ -81,7 +81,8 @@ def _largest_acceleration(log: Log, n: int) -> Array:
 def torque_is_from_rest(robot: Robot, log: Log) -> bool:
     """Whether a log's first torque is that of a simulation from rest, for all that noise tells.
 
-    Whatever is missing, what stands has the torque of one that stands.
+    Whatever is missing, what stands has the torque of one that stands, but for what is constant: where that is
+    off too, this does not tell.
     """
     resting = _from_rest(robot, log, _few(log))
     if resting is None:

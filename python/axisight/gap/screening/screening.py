@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -31,8 +30,6 @@ A = TypeVar("A")
 _TOGETHER = 4
 # Evaluations between two starts of an effect.
 _SCANS = 10
-# Starts in a row, from the smallest, whose loss rises where larger ones only rise further.
-_RISING = 4
 # Share of the loss that the first start of a candidate has to promise where others are dear.
 _LEAST_GAIN = 0.002
 # Share of the most that there is to explain in as many logs, where others stay the ones to screen on.
@@ -274,9 +271,7 @@ class Screening:
             return np.inf if found is None else found
 
         values = sorted(begin)
-        losses = [loss(values[0])]
-        while len(losses) < len(values) and not _only_rises(losses):
-            losses.append(loss(values[len(losses)]))
+        losses = [loss(v) for v in values]
         at = int(np.argmin(losses))
         least, value = losses[at], values[at]
         if least < self.model.total:
@@ -378,11 +373,6 @@ def loudest_logs(above: Array, layout: Layout, before: Sequence[int] = ()) -> li
     if len(before) == count and share[np.isin(logs, before)].sum() > _NEARLY * share[most].sum():
         return list(before)
     return sorted(int(log) for log in logs[most])
-
-
-def _only_rises(losses: Sequence[float]) -> bool:
-    """Whether losses at ever larger values of a number rise from the first: where they do, none is of use."""
-    return len(losses) >= _RISING and all(a < b for a, b in pairwise(losses))
 
 
 def _amplitudes(option: Hypothesis) -> set[str]:

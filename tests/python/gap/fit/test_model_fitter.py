@@ -318,18 +318,8 @@ def test_where_no_start_is_better_none_is_looked_at_closer():
     start = screen(model, fitter).best_of_starts(play())
     assert (start.option.effect.parameters or {})["half_width_rad"] == STARTS[0]
     assert start.gain == pytest.approx(-model.total * STARTS[0])
-    # With the simulator as given, and as it was re-fitted: none of those behind four that rise.
-    assert fitter.asked == [*STARTS[:4], *STARTS[:4]]
-
-
-def test_a_valley_behind_three_starts_that_rise_is_found():
-    """Of a loss that rises at first, as where lost motion chatters."""
-    model, true = fitted(), STARTS[-2]
-    fitter = Valley(
-        lambda v: model.total * (1 + v if v <= STARTS[2] else (v / true - 1) ** 2),
-    )
-    start = screen(model, fitter).best_of_starts(play())
-    assert (start.option.effect.parameters or {})["half_width_rad"] == pytest.approx(true, rel=0.01)
+    # With the simulator as given, and as it was re-fitted.
+    assert fitter.asked == [*STARTS, *STARTS]
 
 
 def test_starts_that_cannot_be_simulated_are_passed_over():
