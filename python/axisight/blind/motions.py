@@ -107,9 +107,9 @@ def _multisine(rng: np.random.Generator, time: Array, loud: Array, share: float 
 
 
 def _cosines(time: Array, frequency_hz: Array, phases: Array) -> Array:
-    """Return the sum of cosines (n,) at equally spaced times: of blocks, and of places in a block.
+    """Return the sum of cosines (n,) at equally spaced times from zero.
 
-    2 sqrt(n) exponentials a frequency instead of n cosines.
+    By exponentials of the start of each block times those within a block: 2 sqrt(n) a frequency, not n cosines.
     """
     n, step = len(time), time[1] - time[0]
     length = int(np.sqrt(n)) + 1

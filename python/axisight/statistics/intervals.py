@@ -10,6 +10,9 @@ from axisight.errors import InputError
 
 Real = NDArray[np.float64]
 
+NORMAL_DEVIATIONS = 1.96
+"""Standard deviations that an interval of 95 % of a normal distribution is to either side."""
+
 
 def student_factor(level: float, degrees_of_freedom: ArrayLike) -> Real:
     """Return how many standard errors an interval of a ``level`` reaches to either side.

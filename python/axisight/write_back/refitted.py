@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING
 
 from axisight.gap.simulator.own_parameters import gain_names
 from axisight.robot import Robot
+from axisight.statistics.intervals import NORMAL_DEVIATIONS
 
 if TYPE_CHECKING:
     from axisight.gap.facts.result import Interval
-
-# Of a normal distribution, what an interval of 95 % is to either side.
-_DEVIATIONS = 1.96
 
 
 @dataclass(frozen=True)
@@ -37,7 +35,7 @@ class Refitted:
     @property
     def standard_error(self) -> float:
         """Its standard error."""
-        return self.stated * (self.change.high - self.change.low) / (2 * _DEVIATIONS)
+        return self.stated * (self.change.high - self.change.low) / (2 * NORMAL_DEVIATIONS)
 
     @property
     def words(self) -> str:

@@ -50,7 +50,7 @@ def robot() -> Robot:
 
 
 RUN = {"mujoco": mujoco_engine.run, "pinocchio": pinocchio_engine.run}
-# In which every kind of gap shows in the torque [s].
+# In which every kind of gap shows in the torque, but those that come late [s].
 LOOK_S = 0.5
 KINDS = [(engine, name) for engine, kinds in ENGINES.items() for name in kinds]
 
@@ -59,11 +59,12 @@ KINDS = [(engine, name) for engine, kinds in ENGINES.items() for name in kinds]
 def multisine(name: str) -> np.ndarray:
     """A multisine on all axes of a preset, (n, n_axes)."""
     _, reference = multisines(np.random.default_rng(3), load_robot(name))["multisine_fresh"]
+    reference.flags.writeable = False
     return reference
 
 
 def short(preset: str, seconds: float = 1.0) -> np.ndarray:
-    """The first second of it."""
+    """Its first ``seconds``."""
     return multisine(preset)[: round(seconds / load_robot(preset).sample_time_s)]
 
 

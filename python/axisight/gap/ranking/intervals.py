@@ -10,6 +10,7 @@ import numpy as np
 from axisight.effects import Effect, effect_info
 from axisight.gap.facts.named_cause import NamedCause
 from axisight.gap.facts.result import Interval
+from axisight.statistics.intervals import NORMAL_DEVIATIONS
 
 
 def intervals(effect: Effect, free: Sequence[str], std: dict[str, float]) -> dict[str, Interval]:
@@ -25,7 +26,7 @@ def intervals(effect: Effect, free: Sequence[str], std: dict[str, float]) -> dic
     out = {}
     for name in free:
         size = abs(values[name] - neutral.get(name, 0.0))
-        spread = 1.96 * float(np.hypot(std.get(name, 0.0), share * size))
+        spread = NORMAL_DEVIATIONS * float(np.hypot(std.get(name, 0.0), share * size))
         lower, upper = bounds[name]
         low, high = values[name] - spread, values[name] + spread
         out[name] = Interval(values[name], max(low, lower), min(high, upper))
@@ -53,7 +54,7 @@ def _with_own_scatter(cause: NamedCause, tolerated: Callable[[Effect], float]) -
     if info.stands_for[1] == "relative":
         scatter *= 1 + told.value
     low, high = (
-        told.value + sign * float(np.hypot(reach - told.value, 1.96 * scatter))
+        told.value + sign * float(np.hypot(reach - told.value, NORMAL_DEVIATIONS * scatter))
         for sign, reach in ((-1, told.low), (1, told.high))
     )
     wider = Interval(told.value, max(low, first.lower), min(high, first.upper))

@@ -18,7 +18,7 @@ from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.rank_deficiency import pseudo_inverse
 from axisight.gap.search.state import SearchState
-from axisight.statistics.intervals import student_factor
+from axisight.statistics.intervals import NORMAL_DEVIATIONS, student_factor
 
 Array = NDArray[np.float64]
 
@@ -106,7 +106,7 @@ def deviations(model: FittedModel) -> dict[tuple[int | None, str], float]:
     inverse = pseudo_inverse(whole)
     known = np.diag(inverse @ prior @ inverse)
     # Intervals are made as of a normal distribution.
-    quantile = float(student_factor(0.95, count - 1) / student_factor(0.95, np.inf))
+    quantile = float(student_factor(0.95, count - 1)) / NORMAL_DEVIATIONS
     found = quantile * np.sqrt(scatter + known)
     return {
         **model.std,

@@ -100,11 +100,11 @@ def _in_parts(
         return ()
     present = {e.label for e in model.effects}
     free = parts_of(effect, winner.trial.hypothesis.bounds, present)
-    alone = all_tried(tried(fitter, [*model.free, f], model) for f in free)
+    alone = all_fitted(fitted_with(fitter, [*model.free, f], model) for f in free)
     both = alone
     if alone is not None and len(free) == 2:
-        both = all_tried(
-            tried(fitter, [*model.free, g, f], beside.fitted, lazy=True)
+        both = all_fitted(
+            fitted_with(fitter, [*model.free, g, f], beside.fitted, lazy=True)
             for f, g, beside in zip(free, free[::-1], alone[::-1], strict=True)
         )
     if not alone or not both:
@@ -141,7 +141,7 @@ def parts_of(
     return [f for f in free if f.effect.label not in known]
 
 
-def tried(
+def fitted_with(
     fitter: ModelFitter, free: Sequence[Hypothesis], start: FittedModel, *, lazy: bool = False
 ) -> FittedHypothesis | None:
     """Return the last of the effects ``free`` beside the others; None if it cannot be simulated."""
@@ -149,7 +149,7 @@ def tried(
     return None if isinstance(found, Diverged) else trial(free[-1], found)
 
 
-def all_tried(trials: Iterable[FittedHypothesis | None]) -> list[FittedHypothesis] | None:
+def all_fitted(trials: Iterable[FittedHypothesis | None]) -> list[FittedHypothesis] | None:
     """Return trials as far as all can be simulated; None from the first that cannot."""
     found = []
     for one in trials:

@@ -23,7 +23,7 @@ from axisight.gap.ranking.drive_lags import is_lag
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.judgement import stand
 from axisight.gap.screening.restart_look_alike import ended_at_bound
-from axisight.gap.search.composites import SHOWS_BESIDE, Found, all_tried, parts_of, tried
+from axisight.gap.search.composites import SHOWS_BESIDE, Found, all_fitted, fitted_with, parts_of
 from axisight.statistics.tails import normal_deviate
 
 Array = NDArray[np.float64]
@@ -124,12 +124,15 @@ class Pairs:
         """Return the parts of a composite that are not known, each on top of the model."""
         effect, bounds = composite.fitted.effects[-1], composite.hypothesis.bounds
         free = parts_of(effect, bounds, known)
-        return all_tried(tried(self.fitter, [*self.model.free, f], self.model) for f in free) or []
+        return (
+            all_fitted(fitted_with(self.fitter, [*self.model.free, f], self.model) for f in free)
+            or []
+        )
 
     def _both(self, one: FittedHypothesis, other: FittedHypothesis) -> FittedHypothesis | None:
         """Return ``other`` on top of the model with ``one``; None if it cannot be simulated."""
         free = [*one.fitted.free, other.hypothesis]
-        return tried(self.fitter, free, one.fitted, lazy=True)
+        return fitted_with(self.fitter, free, one.fitted, lazy=True)
 
     def _beside(
         self, one: str, partner: str, mine: Sequence[FittedHypothesis], axis: int

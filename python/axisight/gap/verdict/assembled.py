@@ -35,6 +35,7 @@ from axisight.gap.verdict.validated import Validated
 from axisight.gap.views.view import View
 from axisight.logs import Log
 from axisight.robot import Robot
+from axisight.statistics.intervals import NORMAL_DEVIATIONS
 
 
 def assembled(
@@ -195,7 +196,7 @@ def _relative(robot: Robot, model: FittedModel, name: str) -> Interval:
     """Return the relative change of a re-fitted parameter with its 95 % interval."""
     nominal, size = nominal_and_size(robot, name)
     change = (model.robot_values[name] - nominal) / size
-    spread = 1.96 * model.std.get((None, name), 0.0) / size
+    spread = NORMAL_DEVIATIONS * model.std.get((None, name), 0.0) / size
     return Interval(change, change - spread, change + spread)
 
 

@@ -322,6 +322,14 @@ def test_where_no_start_is_better_none_is_looked_at_closer():
     assert fitter.asked == [*STARTS, *STARTS]
 
 
+def test_a_valley_behind_starts_that_rise_is_found():
+    """Small widths in a machine with play make it worse: impacts are out of step until the width is right."""
+    model, true = fitted(), STARTS[-2]
+    fitter = Valley(lambda v: model.total * (1 + 2e3 * v if v < STARTS[6] else (v / true - 1) ** 2))
+    start = screen(model, fitter).best_of_starts(play())
+    assert (start.option.effect.parameters or {})["half_width_rad"] == pytest.approx(true, rel=0.01)
+
+
 def test_starts_that_cannot_be_simulated_are_passed_over():
     model, true = fitted(), 5e-5
     fitter = Valley(lambda v: model.total * (v / true - 1) ** 2, fails=3e-4)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from test_run_up import QUICK, SECONDS, WITHHELD, rigid_axis, run_up, waves
 
 from axisight import Effect, Log, Robot, diagnose
+from axisight.gap.intake import start_of_logs
 from axisight.gap.intake.start_of_logs import from_rest
 from axisight.gap.prepare.log_start import begins, run_up_is_better, torque_is_from_rest
 from axisight.logs import RunUp
@@ -96,8 +97,8 @@ def beside_standing(log: Log, held_nm: float) -> Log:
 
 def runs_on(robot: Robot, log: Log) -> bool:
     """Whether a log is told to begin in motion, by a simulation from rest and one that is run up to it."""
-    from_rest = torque_is_from_rest(robot, log)
-    return not from_rest and run_up_is_better(robot, log, run_up(robot, log))
+    told = torque_is_from_rest(robot, log)
+    return not told and run_up_is_better(robot, log, run_up(robot, log))
 
 
 @pytest.mark.parametrize("robot", [bare_axis(), rigid_axis()], ids=["elastic", "rigid"])
@@ -134,6 +135,35 @@ def test_one_that_turns_round_is_run_up_to() -> None:
     logs = turning_logs(robot, "none")
     assert {begins(x, NOISE_RAD) for x in logs} == {"open"}
     assert all(runs_on(robot, log) for log in logs)
+
+
+@pytest.mark.parametrize("kind", ["step", "rise"])
+def test_no_run_up_is_made_where_the_first_torque_is_that_of_a_rest(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = bare_axis()
+    log = at_once(robot, kind, "none")
+    assert torque_is_from_rest(robot, log)
+    assert not any(torque_is_from_rest(robot, turning) for turning in turning_logs(robot, "none"))
+
+    def refused(*_args: object) -> Log:
+        raise AssertionError("a run-up was made")
+
+    monkeypatch.setattr(start_of_logs, "run_up_to", refused)
+    assert from_rest(robot, [log], [log], []).estimation == [log]
+
+
+@pytest.mark.parametrize("column", ["velocity_ref_rad_s", "torque_nm"])
+def test_what_is_wrong_with_an_open_log_is_left_to_the_gate(column: str) -> None:
+    """No simulation goes along it: it is taken as from rest, and refused by name later."""
+    robot = bare_axis()
+    log = at_once(robot, "step", "none")
+    values = np.array(getattr(log, column))
+    values[3] = np.nan
+    broken = replace(log, **{column: values})
+    assert begins(broken, NOISE_RAD) == "open"
+    found = from_rest(robot, [broken], [broken], [])
+    assert found.estimation == [broken] and not found.findings
 
 
 # Larger than what turns the motor round, of torques with a deviation of 5 Nm.
