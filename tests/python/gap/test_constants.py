@@ -5,7 +5,7 @@ from pathlib import Path
 from axisight.gap.constants import constants, main
 
 # So many there are. A rule that needs one more has to find another that nothing needs.
-MOST = 386
+MOST = 385
 
 
 def test_every_constant_says_what_it_rests_on():
