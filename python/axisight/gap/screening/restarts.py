@@ -120,7 +120,7 @@ class Restarts:
         part = self.round.rough or self.round.fitter
         if part is not self.round.fitter:
             # Its sensitivities are those of all of the data. Those of the screened model, for what is beside its last
-            # effect, order starts as well: on two practice cases the losses differ by 2 %, starts by more.
+            # effect, are near enough to order starts.
             leader = replace(leader, columns=self.round.screened.columns)
         at = part.evaluate([*leader.free[:-1], option], leader, robot_values=values)
         return float("inf") if isinstance(at, Diverged) else at.total - linear_gain(at)
