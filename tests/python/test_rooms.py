@@ -11,6 +11,8 @@ from axisight import _core
 
 # What every room uses; the rest belongs to one.
 LOOSE = {
+    # `python -m axisight`.
+    "__main__.py",
     "__init__.py",
     "__init__.pyi",
     "_core.pyi",

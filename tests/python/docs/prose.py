@@ -17,7 +17,9 @@ LONGEST_PARAGRAPH = 120
 _FENCE = re.compile(r"^(\s*)(```|~~~).*?^\1\2\s*$", flags=re.MULTILINE | re.DOTALL)
 _COMMENT = re.compile(r"<!--.*?-->", flags=re.DOTALL)
 # What ends a sentence: not the point of "e.g.", of a number or of a file's name.
-_END = re.compile(r"(?<!\be\.g)(?<!\bi\.e)(?<!\bcf)(?<!\bvs)(?<!\bal)(?<!\bno)[.!?](?=[)*_`\"']*\s)")
+_END = re.compile(
+    r"(?<!\be\.g)(?<!\bi\.e)(?<!\bcf)(?<!\bvs)(?<!\bal)(?<!\bno)[.!?](?=[)*_`\"']*\s)"
+)
 _ITEM = re.compile(r"^\s*([-*+]|\d+[.)])\s+")
 
 
@@ -50,7 +52,9 @@ def plain(text: str) -> str:
 
 def sentences(text: str) -> list[str]:
     """Return the sentences of a paragraph."""
-    return [s.strip() for s in _END.sub(lambda m: m[0] + "\0", plain(text)).split("\0") if s.strip()]
+    return [
+        s.strip() for s in _END.sub(lambda m: m[0] + "\0", plain(text)).split("\0") if s.strip()
+    ]
 
 
 def words(text: str) -> int:
@@ -65,13 +69,18 @@ def strings(source: str) -> Iterator[str]:
         if isinstance(node, ast.JoinedStr):
             parts |= {id(v) for v in node.values}
             yield "".join(v.value if isinstance(v, ast.Constant) else "x" for v in node.values)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in parts:
+        elif (
+            isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in parts
+        ):
             yield from (" ".join(p.split()) for p in re.split(r"\n\s*\n|\n\s*[-|] ", node.value))
 
 
 def comments(source: str) -> Iterator[str]:
     """Yield documentation of Rust code by paragraph."""
-    lines = [re.sub(r"^\s*//[/!]? ?", "", x) if re.match(r"\s*//", x) else "" for x in source.splitlines()]
+    lines = [
+        re.sub(r"^\s*//[/!]? ?", "", x) if re.match(r"\s*//", x) else ""
+        for x in source.splitlines()
+    ]
     yield from blocks("\n".join(lines))
 
 

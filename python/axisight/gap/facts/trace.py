@@ -29,6 +29,7 @@ RULES: Mapping[str, str] = MappingProxyType(
         "composite": "A composite and its part are one hypothesis: the part has the probability of both.",
         "simplest_first": "It explains as much with less: it is named first.",
         "reported_torque": "The controller's gains ask for this torque constant.",
+        "as_entered": "It was not fitted again beside later causes: its odds against the leader are those of before.",
         "beside_causes": "Other causes of the model are no rivals of it.",
         "either": "Another cause does the same to the logs, and is as likely.",
         "twins": "Other effects give the very same logs, and have a share of its probability.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import prod
+from math import exp, prod
 
 from axisight.effects import Effect, effect_info
 from axisight.gap.facts.trace import Adjustment, log_odds
@@ -63,7 +63,7 @@ class AxisPosterior:
     """How the candidates stand on one axis (from 0), best first; with the two that are none.
 
     ``ledger``: the entries that made their log-weights, in order. A probability changes only by `adjusted`,
-    `without`, `exchanged` and `joined`, and each writes there what it did.
+    `without`, `with_untried`, `exchanged` and `joined`, and each writes there what it did.
     """
 
     axis: int
@@ -104,6 +104,34 @@ class AxisPosterior:
             self.p_unknown / whole,
             (*self.ledger, *entries),
         )
+
+    def told_by_other_axes(self, entered: AxisPosterior) -> AxisPosterior:
+        """Return the same with what other axes said of each candidate in ``entered``."""
+        said = [x for x in entered.ledger if x.rule in ("other_axes", "rival_leads")]
+        found = self
+        for x in said:
+            found = found.adjusted(x.rule, {x.hypothesis: exp(x.nats)})
+        return found
+
+    def with_untried(self, entered: AxisPosterior) -> AxisPosterior:
+        """Return the same with the rivals of the leader that were not fitted again, at the odds of ``entered``.
+
+        ``entered``: how the leader stood when it came in, beside fewer causes.
+        """
+        label = self.best.trial.label
+        before = next(r.probability for r in entered.ranked if r.trial.label == label)
+        known = {r.trial.label for r in self.ranked}
+        untried = [r for r in entered.ranked if r.trial.label not in known]
+        nats = sum(x.nats for x in self.ledger if x.hypothesis == label)
+        odds = [r.probability / max(before, TINY) for r in untried]
+        kept = [(x * self.best.probability, r) for x, r in zip(odds, untried, strict=True)]
+        entries = [
+            Adjustment("as_entered", r.trial.label, nats + log_odds(x))
+            for x, r in zip(odds, untried, strict=True)
+        ]
+        found = self._of([*((r.probability, r) for r in self.ranked), *kept], entries)
+        first, *rest = found.ranked
+        return replace(found, ranked=(first, *in_order(rest, None)))
 
     def exchanged(self, rule: str, one: RankedHypothesis) -> AxisPosterior:
         """Return the same led by another candidate, the probabilities of both exchanged."""

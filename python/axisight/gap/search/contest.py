@@ -64,6 +64,7 @@ class Proposal:
     everywhere: bool = False
     leeway: float = 0.0
     as_entered: bool = False
+    entered: AxisPosterior | None = None
 
     @property
     def labels(self) -> frozenset[str]:
@@ -73,14 +74,17 @@ class Proposal:
 
 @dataclass(frozen=True)
 class Decision:
-    """What takes the place of causes: a model, and how what is new in it stands; nothing new where they go out."""
+    """What takes the place of causes: a model, and how what is new in it stands; nothing new where they go out.
+
+    The same model where a cause stays, with how it stands beside the others.
+    """
 
     model: FittedModel
     standing: AxisPosterior | None
 
 
 def decided(context: Context, proposal: Proposal) -> Decision | None:
-    """Return what takes the place of causes; None where they stay, since nothing else is likelier."""
+    """Return what takes the place of causes, or how they stand; None where they stay as they stood."""
     fitter, model = context.fitter, context.state.model
     rest = [f for f in model.free if f.effect.label not in proposal.labels]
     if proposal.or_none == "needless":
@@ -101,9 +105,7 @@ def decided(context: Context, proposal: Proposal) -> Decision | None:
     if proposal.or_none == "doubtful" and (standing is None or _is_none(standing)):
         out = settled(fitter, rest, without)
         return None if isinstance(out, Diverged) else Decision(out, None)
-    if standing is None or standing.best.trial is present:
-        return None
-    return contest.decision(standing)
+    return None if standing is None else contest.decided(standing, present)
 
 
 def _without(context: Context, proposal: Proposal, rest: Sequence[Hypothesis]) -> Decision | None:
@@ -167,6 +169,18 @@ class _Contest:
             # What leaves more than that is none in their place.
             standing = standing.without(ranked.trial.label)
         return None
+
+    def decided(self, standing: AxisPosterior, present: FittedHypothesis) -> Decision | None:
+        """Return the decision for what leads; where a cause stays, how it does, if all its open rivals were tried."""
+        entered = self.proposal.entered
+        if entered is not None:
+            standing = standing.told_by_other_axes(entered)
+        if standing.best.trial is not present:
+            return self.decision(standing)
+        if entered is None:
+            return None
+        judged = replace(standing, axis=entered.axis).with_untried(entered)
+        return Decision(self.state.model, judged)
 
     def decision(self, standing: AxisPosterior) -> Decision:
         """Return the decision for what leads."""

@@ -67,15 +67,18 @@ def _made(move: Move, context: Context, tried: set[tuple[frozenset[str], frozens
             continue
         tried.add(key)
         decision = decided(context, proposal)
-        if decision is not None:
-            _take(move.name, context, proposal, decision)
+        if decision is not None and _taken(move.name, context, proposal, decision):
             return True
     return False
 
 
-def _take(name: str, context: Context, proposal: Proposal, decision: Decision) -> None:
-    """Take a set of causes into the state, with how what is new in it stood."""
+def _taken(name: str, context: Context, proposal: Proposal, decision: Decision) -> bool:
+    """Take a set of causes into the state, with how what is new in it stood; return whether it is another set."""
     state, standing = context.state, decision.standing
+    if decision.model is state.model:
+        if standing is not None:
+            state.judged_again(standing)
+        return False
     left, before = state.left(), {f.effect.label for f in state.model.free}
     if standing is not None and proposal.as_entered:
         standing = _as_entered(state, proposal, standing)
@@ -83,6 +86,7 @@ def _take(name: str, context: Context, proposal: Proposal, decision: Decision) -
     # What was a cause before, and does it alone now, stands as it did, with all its rivals.
     if standing is not None and standing.best.trial.label not in before:
         state.rounds.append(Round((standing,), ((standing.best, standing),), left))
+    return True
 
 
 def _as_entered(state: SearchState, proposal: Proposal, standing: AxisPosterior) -> AxisPosterior:

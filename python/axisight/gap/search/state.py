@@ -71,6 +71,10 @@ class SearchState:
         self.steps.append(Step(move, before, after, self.model.total, model.total))
         self.model = model
 
+    def judged_again(self, standing: AxisPosterior) -> None:
+        """Take how a cause stands beside all others, in the place of how it stood when it came in."""
+        self.rounds.append(Round((standing,), ((standing.best, standing),), self.left()))
+
     def standings_of(self, cause: RankedHypothesis) -> tuple[AxisPosterior, ...]:
         """Return how the round stood in which a cause came in."""
         return next(x.standings for x in self.rounds if any(r is cause for r, _ in x.accepted))

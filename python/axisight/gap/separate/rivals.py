@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from axisight.gap.facts.experiment import ENOUGH, NAMED, Plan, SeparatingExperiment
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.fitted_model import FittedModel
+from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.likelihood import log_ratio
 from axisight.gap.search.state import SearchState
 from axisight.gap.separate.question import Seen, Turn
@@ -94,6 +95,7 @@ def rivals_of(found: SearchState, settings: Settings) -> Rivals | None:
     if not open_pairs:
         return None
     _, first, other = max(open_pairs, key=lambda x: x[0])
+    first = _beside_as_many(found, first, other)
     samples = found.layout.samples()
     return Rivals(
         (first.label, other.label),
@@ -102,3 +104,18 @@ def rivals_of(found: SearchState, settings: Settings) -> Rivals | None:
         np.maximum(found.to_explain(), 0.0) / samples,
         settings.smallest_gain,
     )
+
+
+def _beside_as_many(
+    found: SearchState, first: FittedHypothesis, other: FittedHypothesis
+) -> FittedHypothesis:
+    """Return a cause as it was fitted beside the same others as its rival, which may not have been fitted since."""
+    for one in found.rounds:
+        for r, _ in one.accepted:
+            if r.trial.label == first.label and _others(r.trial) == _others(other):
+                return r.trial
+    return first
+
+
+def _others(one: FittedHypothesis) -> set[str]:
+    return {f.effect.label for f in one.fitted.free[:-1]}
