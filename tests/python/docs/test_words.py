@@ -26,9 +26,7 @@ BEGINNERS = ("index", "start_diagnose", "start_identify", "start_simulate", "ten
 # Flesch calls 60 to 70 plain English, 50 to 60 fairly difficult; field terms have many syllables.
 PLAIN = 55.0
 # Where single cases of the benchmark may be told.
-DIARY = re.compile(
-    r"\b(seed|case)s? \d{2,}|\bsince then\b|\bused to be\b", re.IGNORECASE
-)
+DIARY = re.compile(r"\b(seed|case)s? \d{2,}|\bsince then\b|\bused to be\b", re.IGNORECASE)
 
 
 def pages(repository: Path) -> list[Path]:

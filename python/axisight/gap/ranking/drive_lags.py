@@ -1,7 +1,7 @@
-"""Delays and lags of a drive, fitted until their fits end before they are held against one another.
+"""Full fits of delays and lags of a drive before they are compared.
 
-They differ by little, and by less than fits leave open that are good enough for other rivals. A well damped
-current loop is a delay up to the third power of frequency: it is begun there too, not only where a screen does.
+Their losses differ by less than the stopping tolerance of other fits. A well damped current loop equals a delay up to
+the third power of frequency, so its fit also starts from the fitted delay.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.posterior import AxisPosterior
 
-# Of what the leader of an axis explains, which a lag may explain less and still end at as much.
+# Score by which a lag may trail the leader and still overtake it after a full fit.
 _NEAR = 0.03
-# Steps of a fit that is to end, and the loss that one more has to bring.
+# Most steps of a full fit, and the fall of the loss below which it ends.
 _STEPS = 12
 _WORTH = 1.0
 
 
 def lags_beside(standing: AxisPosterior) -> list[FittedHypothesis]:
-    """Return the delays and lags of an axis that one of them leads on, as far as they are near it."""
+    """Return the delays and lags close to the leader of an axis; none unless a delay or lag of the axis leads."""
     if not _is_of(standing.axis, standing.best.trial):
         return []
     least = standing.best.score - _NEAR
@@ -44,7 +44,7 @@ def is_lag(effect: Effect) -> bool:
 def ended(
     fitter: ModelFitter, lags: Sequence[FittedHypothesis], options: Sequence[Hypothesis]
 ) -> list[FittedModel]:
-    """Return fits of lags that have ended; of one that is like another the better of two, one begun as that."""
+    """Return full fits of the lags. A lag that resembles another also starts from it; the better fit counts."""
     found = {one.hypothesis.effect.name: _ended(fitter, one.fitted) for one in lags}
     for info in effect_table().values():
         other = None if info.resembles is None else found.get(info.resembles.law)
@@ -55,7 +55,7 @@ def ended(
         if begun is None or (mine is not None and mine.total <= other.total):
             continue
         again = fitter.fit(begun, other, fresh=True, max_iterations=_STEPS, worth=_WORTH)
-        # Where it does not hold, what there is stays.
+        # If it diverges, the fit from the first start stays.
         if not isinstance(again, Diverged) and (mine is None or again.total < mine.total):
             found[info.name] = again
     return list(found.values())
@@ -69,7 +69,7 @@ def _ended(fitter: ModelFitter, fitted: FittedModel) -> FittedModel:
 def _begun_as(
     other: FittedModel, name: str, like: Resembles, options: Sequence[Hypothesis]
 ) -> list[Hypothesis] | None:
-    """Return a model with an effect in the place of the one that it is like, the last; None where none is tried."""
+    """Return the hypotheses with the last one replaced by the effect that resembles it; None if it is not offered."""
     effect = other.effects[-1]
     values = like.values(effect.values()[0])
     tried = (o for o in options if (o.effect.name, o.effect.axis) == (name, effect.axis))

@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 
 
 def numbers(effect: Hypothesis) -> float:
-    """Return the number of fitted values of an effect; the order of a harmonic counts too.
+    """Return the number of fitted values of an effect. The order of a harmonic counts as one.
 
-    On which side of a gear it acts is a place, which counts no more than the axis does.
+    The side of a gear on which an effect acts is a place and costs nothing, like the axis.
     """
     harmonics = sum(name.startswith("cosine_") and name[7].isdigit() for name in effect.free)
     places = effect_info(effect.effect.name).marked("place")
@@ -30,9 +30,10 @@ def numbers(effect: Hypothesis) -> float:
 
 @dataclass(frozen=True)
 class FittedHypothesis:
-    """A candidate fitted on top of a model: its held-out loss by block, (n_blocks,).
+    """A hypothesis fitted together with the effects of a model.
 
-    ``idle``: numbers of it that it does not need; ``also``: effects that are under trial together with it.
+    ``held_out`` (n_blocks,): its held-out loss by block; ``idle``: how many of its numbers the fit does not need;
+    ``also``: further effects that are tried together with it.
     """
 
     hypothesis: Hypothesis
@@ -48,17 +49,17 @@ class FittedHypothesis:
 
     @property
     def cost(self) -> float:
-        """Number of fitted values that it needs; the order of a harmonic counts too."""
+        """Number of fitted values that it needs. The order of a harmonic counts as one."""
         return sum(map(numbers, (*self.also, self.hypothesis))) - self.idle
 
 
 def trial(
     hypothesis: Hypothesis, fitted: FittedModel, model: FittedModel | None = None
 ) -> FittedHypothesis:
-    """Score a fitted candidate on held-out data.
+    """Return a fitted hypothesis with its held-out loss.
 
-    ``model``: without it, on top of which it is judged. Where parts of the data are left out otherwise than
-    of that alone, what it lowers the loss by is counted with these.
+    ``model``: the model without it. If the two are scored on different folds of the data, the difference that
+    the folds make for ``model`` is added, so that both losses compare.
     """
 
     def pays(loss: float, without: float, count: float) -> bool:
@@ -71,10 +72,10 @@ def trial(
 
 
 def _left_out_otherwise(model: FittedModel, fitted: FittedModel) -> Array:
-    """Return what parameters of the simulator add to the loss of each block where logs are left out as of ``model``.
+    """Return by how much the loss of ``model`` rises with its own folds against those of ``fitted`` (n_blocks,).
 
-    Beyond what they do as of ``evidence``. Where they add less on an axis, it is the gap that misleads them, and
-    that a fit with its cause no longer has.
+    Zero on axes where it falls: there the gap itself misleads the own parameters, and a fit with the cause does not
+    have that error.
     """
     more = held_out_loss(model) - held_out_loss(model, like=fitted)
     on_axis = np.bincount(model.axis, more)[model.axis]
@@ -82,7 +83,7 @@ def _left_out_otherwise(model: FittedModel, fitted: FittedModel) -> Array:
 
 
 def falls(trials: Sequence[FittedHypothesis], current: Array, layout: Layout) -> Array:
-    """Return by how much each trial lowers the held-out loss of each axis, (n_trials, n_axes)."""
+    """Return the fall of the held-out loss by trial and axis, (n_trials, n_axes)."""
     return np.array([layout.by_axis(current - t.held_out) for t in trials]).reshape(
         len(trials), layout.n_axes
     )

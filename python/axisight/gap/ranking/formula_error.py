@@ -1,8 +1,7 @@
-"""Causes that are held against one another by little, as whoever writes their formulas leaves little.
+"""Smaller formula error for effects with one accepted formula: rigid bodies, delays, friction laws.
 
-Two formulas for one physical effect may differ by a fiftieth of what they explain. Of some effects they do
-not: a load is one whoever simulates it. Where one of these leaves next to nothing, another of them that leaves
-more than that is not the cause, however small a share of the gap that is.
+Two formulas of one effect may differ by 2 % of what they explain. A rigid load has only one formula. If one effect
+of such a kind leaves almost no error, its rivals of the same kind that leave more become improbable.
 """
 
 from __future__ import annotations
@@ -19,14 +18,14 @@ from axisight.gap.fit.fitted_model import Hypothesis
 Array = NDArray[np.float64]
 Members = NDArray[np.int64]
 
-# Next to nothing, as a share of what there is to explain: real machines leave more of any law. And hardly more than
-# noise, as a multiple of that.
+# Almost no error, as a share of what there is to explain: on real machines every law leaves more. And close to the
+# noise, as a multiple of its loss.
 NEXT_TO_NOTHING = 1e-3
 _HARDLY_MORE = 4.0
-# By how many times more than for other rivals the difference between effects counts whose right one leaves what is
-# white. With four times, a bias by noise of a fortieth of it would be sure.
+# Weight of a loss difference between effects whose true one leaves white noise. With a weight of four, a bias of
+# 1/40 of the noise would count as certain.
 _WHITE_SURER = 2.0
-# Sums of the same residuals in another order.
+# Rounding of sums over the same residuals in another order.
 _ROUNDING = 1e-9
 
 
@@ -39,11 +38,11 @@ def held_apart(
     least: float,
     likelihood: Callable[[Array, Members], Array],
 ) -> Array:
-    """Return log-probabilities with candidates of one kind held against one another by little.
+    """Return log-probabilities (n_candidates + 2,) where candidates of one kind compete by their own formula error.
 
-    Those of ``axis`` (from 0; None: of all), by what they leave there; of weights those of the arm, too. Together
-    they are as probable as they were. On other axes they leave what the rest of the model does. ``losses``: as
-    predicted, less than ``least`` by chance; ``likelihood`` of what some of them leave, logarithmic.
+    Only candidates that act on ``axis`` (from 0; None: on all) or on the arm compete. Their total probability stays.
+    ``losses``: held-out losses; ``least``: the loss of noise; ``explainable``: loss above noise without a candidate;
+    ``likelihood``: log-likelihood of some losses for the members with these indices.
     """
     out = logp.copy()
     for members, error, surer in _kinds(candidates, axis, losses, explainable, least):
@@ -61,9 +60,9 @@ def _kinds(
     explainable: float,
     least: float,
 ) -> Iterator[tuple[Members, float, float]]:
-    """Yield which are of one kind, what the right one of them may leave, and how many times as much it counts.
+    """Yield the members of each kind, the error that their formula may leave, and the weight of a difference.
 
-    Where none of a kind leaves little enough, only those that are held to their error wherever they are tried.
+    If no member comes near enough to the noise, only members whose formula is always exact are yielded.
     """
     effects = [c.effect for c in candidates]
     formulas = [effect_info(e.name).formula for e in effects]
@@ -85,7 +84,10 @@ def _kinds(
 
 
 def _tie(logp: Array, losses: Array, members: Members) -> None:
-    """Make what leaves the very same as one of the members no likelier than it: a deadband as an offset."""
+    """Limit a candidate with exactly the loss of a member to that member's log-probability.
+
+    Example: a deadband that acts as an offset.
+    """
     for i in np.setdiff1d(np.arange(len(losses)), members):
         same = members[np.abs(losses[members] - losses[i]) <= _ROUNDING * losses[i]]
         if len(same):

@@ -1,4 +1,4 @@
-"""Intervals of an effect's parameters: what the fit leaves open, and how far formulas of one effect differ."""
+"""Intervals of an effect's parameters: standard error of the fit and formula error, added in squares."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from axisight.statistics.intervals import NORMAL_DEVIATIONS
 
 
 def intervals(effect: Effect, free: Sequence[str], std: dict[str, float]) -> dict[str, Interval]:
-    """Return the 95 % intervals of the fitted parameters ``free``, ``std`` those of the fit.
+    """Return the 95 % intervals of the fitted parameters ``free``; ``std``: their standard errors in the fit.
 
-    Within what the effect takes: no speed is below zero, however little the data say of it.
+    Intervals stay within the bounds of the effect: no speed is below zero.
     """
     info = effect_info(effect.name)
     values = effect.parameters or {}
@@ -36,10 +36,10 @@ def intervals(effect: Effect, free: Sequence[str], std: dict[str, float]) -> dic
 def with_own_scatter(
     causes: Sequence[NamedCause], tolerated: Callable[[Effect], float]
 ) -> tuple[NamedCause, ...]:
-    """Return causes that change a parameter of the simulator with the tolerance of that in their intervals.
+    """Return the causes, with the tolerance of an own parameter in the interval of a cause that changes it.
 
-    A link is heavier by what is wrong with it and by what every link of its kind is off by: no logs tell
-    the two apart. ``tolerated``: size of an effect up to which it is that scatter, three deviations.
+    A heavy link may be a wrong mass or the scatter of its type. Logs cannot tell the two apart. ``tolerated``: the
+    size of an effect up to which it is scatter, three standard deviations.
     """
     return tuple(_with_own_scatter(c, tolerated) for c in causes)
 

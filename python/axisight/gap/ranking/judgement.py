@@ -39,13 +39,12 @@ def stand(
     without: FittedModel,
     explained_share: float,
 ) -> AxisPosterior | None:
-    """Rank the candidates that lower the loss of ``axis`` (from 0; None: of all together); None if there is none.
+    """Rank the candidates that lower the loss of ``axis`` (from 0; None: of all together); None if none does.
 
     ``current`` and ``floor`` (n_blocks,): held-out loss of the model ``without`` the candidates, and of a perfect
-    one. Likelihood ratio of the held-out error on the axis with unknown variance, formula error added, one cost
-    per fitted number, and the price of own parameters that are bent. *No cause* leaves the loss what it is.
-    *Something unknown* counts as a candidate that explains ``explained_share``: one that explains less is less
-    probable than a cause nobody has thought of.
+    model. The log-weight of a candidate is the likelihood of its held-out loss with unknown variance, with the formula
+    error added, less a cost for each fitted number, less the price of bent own parameters. *None* keeps the loss of
+    ``without``. *Unknown* counts as a candidate that explains ``explained_share`` of the loss above the floor.
     """
     here = layout.of(axis)
     before, least = float(current[here].sum()), float(floor[here].sum())
@@ -56,7 +55,7 @@ def stand(
     losses = np.array([t.held_out[here].sum() for t in mine])
     hypotheses = np.append(losses, [before, before - explained_share * explainable])
     tempered = np.maximum(hypotheses, least) + FORMULA_ERROR * explainable
-    # An unknown cause has as many numbers to it as the known one that explains most.
+    # An unknown cause costs as many numbers as the best known candidate.
     unknown = mine[int(np.argmin(losses))].cost
     cost = np.array([*_costs(mine), 0.0, PARAMETER_COST * unknown])
     belief = Belief([*(t.label for t in mine), NONE, UNKNOWN])
@@ -99,10 +98,10 @@ def stand(
 
 
 def _costs(trials: Sequence[FittedHypothesis]) -> Array:
-    """Return what the numbers of each trial cost (n_trials,).
+    """Return the cost of the fitted numbers of each trial (n_trials,) [nats].
 
-    What is like another effect at some values of its parameters is no rarer, where neither leaves more, than its
-    resemblance has it: its further numbers cost no more than that.
+    An effect that equals another at some values of its parameters costs at most the other's cost plus the log of how
+    much rarer it is.
     """
     out = PARAMETER_COST * np.array([t.cost for t in trials])
     places = {(t.hypothesis.effect.name, t.hypothesis.effect.axis): i for i, t in enumerate(trials)}
@@ -120,10 +119,9 @@ def _prices(
     floor: Array,
     layout: Layout,
 ) -> Array:
-    """Return what the simulator's own parameters pay in each trial, *none* and *unknown* (n_trials + 2,) [nats].
+    """Return the price of bent own parameters for each trial, *none* and *unknown* (n_trials + 2,) [nats].
 
-    *None* is the model ``without`` any of them. *Unknown* is held against the trials by what these explain, and
-    bends nothing.
+    *None* is the model ``without`` the trials. *Unknown* pays nothing.
     """
     least = layout.by_axis(floor)
     explainable = np.maximum(layout.by_axis(current) - least, 0.0)
@@ -143,10 +141,10 @@ def set_likelier(
     layout: Layout,
     axis: int | None,
 ) -> bool:
-    """Whether one effect is likelier than several in its place, by likelihood, cost and own parameters.
+    """Whether one effect is likelier than several on ``axis`` (from 0; None: on all together).
 
-    On ``axis`` (from 0; None: on all together). What a further effect takes away is no error of a formula: none is
-    added. Which effect it is costs as a number does. ``floor`` (n_blocks,): below it nothing counts.
+    Compares likelihood, cost of numbers, and price of own parameters. No formula error is added, since a further effect
+    removes more than that. Each effect costs one number more. Losses below ``floor`` (n_blocks,) count as the floor.
     """
     here = layout.of(axis)
     both = [one, several]
@@ -157,18 +155,18 @@ def set_likelier(
     return bool(weight[0] > weight[1])
 
 
-# Half of it is a log-likelihood ratio; and fits of candidates end at a share of their loss, of which
-# they leave open about as much again.
+# Fall of the fit loss that counts as a better fit: a log-likelihood ratio of two, or this share of the loss, at which
+# fits of candidates end.
 _BETTER = 4.0
 
 _LEFT_OPEN = 2e-3
 
-# Share of what there is to explain by which it may predict worse all the same.
+# Score by which a rival may predict worse than the leader and still count as near.
 _NEARLY = 0.1
 
 
 def _fitted_loss(fitted: FittedModel, here: NDArray[np.bool_]) -> float:
-    """Return the loss of a fit on some blocks, with what the simulator's own parameters went off."""
+    """Return the loss of a fit on some blocks plus chi-square of the own parameters' tolerances."""
     precision = np.diag(fitted.prior_matrix)
     told = precision > 0
     off = fitted.prior_gradient[told] ** 2 / precision[told]
@@ -178,12 +176,11 @@ def _fitted_loss(fitted: FittedModel, here: NDArray[np.bool_]) -> float:
 def _with_those_that_fit_better(
     trials: Sequence[FittedHypothesis], logp: Array, score: Array, fitted: Array, cost: Array
 ) -> Array:
-    """Return log-probabilities with rivals as probable as the first that fit the logs better than it.
+    """Return log-probabilities where a near rival that fits better than the leader is as probable as the leader.
 
-    With few logs, what is predicted without one hangs on what the others tell of the simulator's own
-    parameters. Where of two that explain the same share the one predicts better and the other, with no more
-    numbers to it, fits better, neither is surer; of lags, neither is where it fits as well. ``fitted``: loss of
-    the fits on the axis; ``cost``: logarithmic, of what the numbers of each cost.
+    With few logs, predictions of a left-out log depend on what the other logs tell of the own parameters. If the
+    leader predicts better, but a near rival with no more numbers fits better, neither is surer. For lags an equal
+    fit is enough. ``score``: share explained by held-out loss; ``fitted``: fit losses on the axis; ``cost`` [nats].
     """
     first = int(np.argmax(logp[: len(trials)]))
     leeway = max(_BETTER, _LEFT_OPEN * fitted[first])
@@ -202,10 +199,10 @@ def _with_those_that_fit_better(
 def _significance(
     t: FittedHypothesis, current: Array, layout: Layout, axis: int | None, *, explains: bool
 ) -> float:
-    """Return how sure a trial is on an axis: by its gain, or by its size.
+    """Return how sure a trial is on an axis, by its gain or by its fitted size [standard deviations].
 
-    The size counts where the effect acts itself and ``explains`` the axis: one that explains part
-    of it has a size too, whatever the cause is.
+    The size counts only on an axis where the effect acts, and if it ``explains`` that axis: an effect that explains a
+    part has a sure size even where it is not the cause.
     """
     gain = layout.significance(current, t.held_out, axis)
     own = axis is None or t.hypothesis.effect.acts_on(axis + 1)

@@ -1,11 +1,12 @@
-"""Laws that are held to a plainer one, where what they add to it is not there.
+"""Prefers the plainer law where the data do not show what a richer law adds to it.
 
-Whoever writes dry friction rounds its corner otherwise, over speed or over a small way; a law with a way of its own
-takes up the difference, and predicts better by it, as does an excess at standstill that never shows, since the sign
-turns over a wider range of speeds. A gear with a knee that nothing reaches, or all pass, is one of another stiffness.
-A cable that hardly pulls harder as it is stretched, and is at rest far away,
-pulls like a constant. Where the way or the stiffness is real its size is sure, and where the excess is, friction
-falls with speed.
+A richer law can fit small differences between formulas with numbers that mean nothing:
+
+- Presliding and Stribeck friction fit the rounded corner of dry friction.
+- A gear with a knee outside the deflections seen is a gear of another stiffness.
+- A cable of low stiffness that is stretched far pulls like a constant torque.
+
+If the addition is real, its parameter has a small standard error, or friction falls with speed.
 """
 
 from __future__ import annotations
@@ -23,12 +24,10 @@ from axisight.gap.fit.held_out import step_without
 
 Array = NDArray[np.float64]
 
-# Standard error of a way or a stiffness, of itself, above which it is not known. Of ways, on machines of three
-# engines: up to 0.4, fits that have not ended included, where friction yields; where it does not, the way is at its
-# bound or the error two.
+# Relative standard error above which an added parameter is not known. On machines of three engines it is at most 0.4
+# where friction yields before it slips. Where it does not, the parameter is at its bound or the error is about 2.
 _UNKNOWN = 0.5
-# By how much of itself friction is larger at some speed than at high speed, where it has an excess: five per
-# cent is what another rounding of the corner makes of it.
+# Least rise of friction at low speed over that at high speed, relative. Another rounding of the corner makes 5 %.
 _RISES = 0.05
 
 
@@ -38,9 +37,10 @@ def held_to_plainer(
     logp: Array,
     stretch: NDArray[np.int64],
 ) -> Array:
-    """Return log-probabilities (n_fits and others,), of laws that are no more than a plainer one less than its own.
+    """Return log-probabilities where a law that adds nothing to its plainer law is less probable than that.
 
-    ``effects``: of candidates, and their ``fits``; ``stretch`` (n_blocks,): the stretch of time of each block.
+    ``effects``: of the candidates; ``fits``: their fits; ``logp`` (n_fits + 2,); ``stretch`` (n_blocks,): the stretch
+    of time of each block.
     """
     out = logp.copy()
     places = {(effect.name, effect.axis): i for i, effect in enumerate(effects)}
@@ -53,16 +53,16 @@ def held_to_plainer(
 
 
 def _is_plain(plainer: Plainer, fit: FittedModel, stretch: NDArray[np.int64]) -> bool:
-    """Whether a fitted law is no more than its plainer one."""
+    """Whether the data show nothing of what a fitted law adds to its plainer law."""
     if plainer.by_rise:
         return rise_over_high_speed(fit.effects[-1]) < _RISES
     return any(own_error(fit, added, stretch) > _UNKNOWN for added in plainer.adds)
 
 
 def own_error(fitted: FittedModel, name: str, stretch: NDArray[np.int64]) -> float:
-    """Return the standard error of a parameter of the last effect, of itself: delete-one-stretch jackknife.
+    """Return the relative standard error of a parameter of the last effect, by a delete-one-stretch jackknife.
 
-    Infinite where it is not fitted, is none, or stands at a bound.
+    Infinite if the parameter is not fitted, is zero, or stands at a bound.
     """
     key = (len(fitted.effects) - 1, name)
     size = abs((fitted.effects[-1].parameters or {})[name])

@@ -17,17 +17,17 @@ TINY = 1e-300
 
 
 def _against_the_best(standing: AxisPosterior) -> dict[str, float]:
-    """Return how probable each candidate of an axis is against the best there, by label."""
+    """Return the odds of each candidate against the best one of the axis, by label."""
     return {r.trial.label: r.probability / standing.best.probability for r in standing.ranked}
 
 
 @dataclass(frozen=True)
 class RankedHypothesis:
-    """A trial as it stands on one axis.
+    """A fitted hypothesis with its rank on one axis.
 
-    ``score``: share of what is left to explain there that it removes; ``gain``: fall of the mean
-    square of the weighted residual there; ``significance``: how sure that is, in standard
-    deviations; ``probability`` among all candidates there, no cause and an unknown one.
+    ``score``: share of the loss above the floor that it removes there; ``gain``: fall of the mean square of the
+    residual there; ``significance`` of that gain [standard deviations]; ``probability`` beside all candidates of
+    the axis, *none* and *unknown*.
     """
 
     trial: FittedHypothesis
@@ -42,12 +42,12 @@ class RankedHypothesis:
         return effect_info(self.trial.hypothesis.effect.name).family
 
 
-# Ratio of probabilities within which two hypotheses are as likely: less than fits leave open.
+# Ratio of probabilities from which two hypotheses count as equally likely; fits are not more exact.
 _AS_LIKELY = 0.99
 
 
 def in_order(ranked: Sequence[RankedHypothesis], axis: int | None) -> tuple[RankedHypothesis, ...]:
-    """Return hypotheses, the most probable first; of those as likely as it, what acts on ``axis`` (from 0) alone."""
+    """Return hypotheses, the most probable first. Among equally likely ones, those that act on ``axis`` (from 0)."""
     found = sorted(ranked, key=lambda r: (-r.probability, -r.score, r.trial.label))
 
     def behind(r: RankedHypothesis) -> tuple[bool, bool]:
@@ -60,10 +60,10 @@ def in_order(ranked: Sequence[RankedHypothesis], axis: int | None) -> tuple[Rank
 
 @dataclass(frozen=True)
 class AxisPosterior:
-    """How the candidates stand on one axis (from 0), best first; with the two that are none.
+    """The candidates of one axis (from 0) with their probabilities, best first, and *none* and *unknown*.
 
-    ``ledger``: the entries that made their log-weights, in order. A probability changes only by `adjusted`,
-    `without`, `with_untried`, `exchanged` and `joined`, and each writes there what it did.
+    ``ledger``: the entries that make up the log-weights, in order. Only `adjusted`, `without`, `with_untried`,
+    `exchanged` and `joined` change a probability, and each writes an entry.
     """
 
     axis: int
@@ -78,7 +78,7 @@ class AxisPosterior:
         return self.ranked[0]
 
     def adjusted(self, rule: str, odds: Mapping[str, float]) -> AxisPosterior:
-        """Return the same with candidates, by label, counted for so many times as probable."""
+        """Return the posterior with the odds of candidates, by label, multiplied by a factor."""
         weighed = [(odds.get(r.trial.label, 1.0), r) for r in self.ranked]
         changed = [(times, r) for times, r in weighed if times != 1]
         left = [(times * r.probability, r) for times, r in weighed]
@@ -87,7 +87,7 @@ class AxisPosterior:
         return replace(found, ranked=in_order(found.ranked, self.axis)) if changed else found
 
     def without(self, *labels: str) -> AxisPosterior:
-        """Return the same without some candidates, by label."""
+        """Return the posterior without some candidates, by label."""
         left = [(r.probability, r) for r in self.ranked if r.trial.label not in labels]
         gone = [r.trial.label for r in self.ranked if r.trial.label in labels]
         return self._of(left, [Adjustment("not_a_cause", x, log_odds(0.0)) for x in gone])
@@ -95,7 +95,7 @@ class AxisPosterior:
     def _of(
         self, weighed: Sequence[tuple[float, RankedHypothesis]], entries: Sequence[Adjustment]
     ) -> AxisPosterior:
-        """Return the same of candidates with other weights, normalised anew."""
+        """Return the posterior for other weights of candidates, normalised."""
         whole = sum(weight for weight, _ in weighed) + self.p_none + self.p_unknown
         return AxisPosterior(
             self.axis,
@@ -106,7 +106,7 @@ class AxisPosterior:
         )
 
     def told_by_other_axes(self, entered: AxisPosterior) -> AxisPosterior:
-        """Return the same with what other axes said of each candidate in ``entered``."""
+        """Return the posterior with the entries of ``entered`` that come from other axes applied again."""
         said = [x for x in entered.ledger if x.rule in ("other_axes", "rival_leads")]
         found = self
         for x in said:
@@ -114,9 +114,10 @@ class AxisPosterior:
         return found
 
     def with_untried(self, entered: AxisPosterior) -> AxisPosterior:
-        """Return the same with the rivals of the leader that were not fitted again, at the odds of ``entered``.
+        """Return the posterior with the rivals of ``entered`` that were not fitted again.
 
-        ``entered``: how the leader stood when it came in, beside fewer causes.
+        ``entered``: the posterior when the leader was added, beside fewer causes. Such rivals keep their odds against
+        the leader.
         """
         label = self.best.trial.label
         before = next(r.probability for r in entered.ranked if r.trial.label == label)
@@ -134,7 +135,7 @@ class AxisPosterior:
         return replace(found, ranked=(first, *in_order(rest, None)))
 
     def exchanged(self, rule: str, one: RankedHypothesis) -> AxisPosterior:
-        """Return the same led by another candidate, the probabilities of both exchanged."""
+        """Return the posterior with another candidate first; the two exchange their probabilities."""
         first = replace(one, probability=self.best.probability)
         other = replace(self.best, probability=one.probability)
         nats = log_odds(first.probability) - log_odds(max(one.probability, TINY))
@@ -146,7 +147,7 @@ class AxisPosterior:
         return replace(self, ranked=(first, *rest), ledger=(*self.ledger, *entries))
 
     def joined(self, into: RankedHypothesis, parts: Sequence[RankedHypothesis]) -> AxisPosterior:
-        """Return the same led by ``into``, in the place of ``parts`` and with their probability."""
+        """Return the posterior with ``into`` first, in the place of ``parts`` and with their total probability."""
         gone = {r.trial.label for r in parts}
         first = replace(into, probability=sum(r.probability for r in parts))
         rest = (r for r in self.ranked if r.trial.label not in gone)
@@ -160,20 +161,20 @@ class AxisPosterior:
         return replace(self, ranked=(first, *rest), ledger=(*self.ledger, *entries))
 
     def led_by(self, first: RankedHypothesis, rule: str | None = None) -> AxisPosterior:
-        """Return the same with one of its candidates named first, as probable as it is."""
+        """Return the posterior with another candidate first; probabilities stay."""
         entry = () if rule is None else (Adjustment(rule, first.trial.label, 0.0),)
         rest = (r for r in self.ranked if r is not first)
         return replace(self, ranked=(first, *rest), ledger=(*self.ledger, *entry))
 
     def without_first(self, count: int) -> AxisPosterior:
-        """Return the same without its first candidates."""
+        """Return the posterior without its first ``count`` candidates."""
         return self.without(*(r.trial.label for r in self.ranked[:count]))
 
     def with_axes_it_leads(self, others: Sequence[AxisPosterior]) -> AxisPosterior:
-        """Return the same with rivals held against the first where they do worst.
+        """Return the posterior with each rival at its lowest odds against the leader on any axis that the leader leads.
 
-        ``others``: of other axes that the first leads too. What moves several axes is seen on
-        all of them; one that does as well on one of them may do worse on another.
+        ``others``: the posteriors of the other axes that it leads. An effect that moves several axes shows on all of
+        them; a rival may do as well on one axis and worse on another.
         """
         first = self.best.probability
         there = [_against_the_best(other) for other in others]
@@ -187,9 +188,9 @@ class AxisPosterior:
         return self.adjusted("other_axes", {label: min(x, 1.0) for label, x in odds.items()})
 
     def with_axes_rivals_lead(self, others: Sequence[AxisPosterior]) -> AxisPosterior:
-        """Return the same with all held by what axes say on which rivals of the first lead surely.
+        """Return the posterior with all candidates weighed by axes where a rival of the leader surely leads.
 
-        ``others``: of these axes. What is seen on two axes is judged by both.
+        ``others``: the posteriors of these axes. An effect that shows on two axes is judged by both.
         """
         there = [_against_the_best(other) for other in others]
         odds = {
@@ -199,9 +200,9 @@ class AxisPosterior:
         return self.adjusted("rival_leads", odds)
 
     def inseparable(self) -> list[RankedHypothesis]:
-        """Return the candidates the data cannot tell apart, the winner first; one if it is clear.
+        """Return the candidates that the data cannot tell apart, the leader first; the leader alone if it is clear.
 
-        Of many rivals none of which is likely by itself, the likeliest.
+        If many rivals are likely only together, the likeliest of them is returned.
         """
         winner, rivals = self.best, self.ranked[1:]
         bar = _RIVAL * winner.probability / (1 - _RIVAL)
@@ -211,9 +212,9 @@ class AxisPosterior:
         return [winner, *(r for r in rivals if r.probability >= bar)]
 
     def usual_first(self) -> AxisPosterior:
-        """Return the same with what is more usual than the winner counted for as much more.
+        """Return the posterior with the odds of common look-alikes of the leader multiplied by their prior odds.
 
-        What both explain as well is more often the usual one.
+        Where two effects explain the data equally well, the common one is more often the cause.
         """
         effect = self.best.trial.hypothesis.effect
         usual = [effect_info(name) for name in effect_info(effect.name).usual]
@@ -226,9 +227,9 @@ class AxisPosterior:
         return self.adjusted("look_alike", odds)
 
     def play_first(self) -> AxisPosterior:
-        """Return the same led by play where the winner is a gear whose middle has lost its stiffness.
+        """Return the posterior led by backlash if the leader is a gear without stiffness around its middle.
 
-        Such a gear has play, whichever formula does better: engines and machines end it more softly or harder.
+        Such a gear has backlash, whichever formula fits better: the ends of the gap are softer or harder by machine.
         """
         effect = self.best.trial.fitted.effects[-1]
         info = effect_info(effect.name)
@@ -242,22 +243,22 @@ class AxisPosterior:
         return self
 
 
-# A middle that has lost this share of its stiffness is none; and what play explains of what it does.
+# Loss of stiffness from which a gear has no stiffness in its middle, and the share of the leader's score that
+# backlash needs to be named.
 _NO_MIDDLE = 0.95
 
 _AS_PLAY = 0.8
 
-# A rival this likely beside the winner leaves the cause open, and so do all of them if together they are
-# as likely as this.
+# Probability of a rival, beside the leader alone, from which the cause stays open; and of all rivals together.
 _RIVAL = 0.2
 
 _RIVALS = 0.25
 
 
 def as_good_with_less(standing: AxisPosterior) -> list[RankedHypothesis]:
-    """Return the rivals that need fewer numbers than the leader, and explain nearly as much.
+    """Return the rivals that explain nearly as much as the leader with fewer numbers.
 
-    What they leave more may be the error of sensitivities that are not their own.
+    The difference may come from sensitivities that were taken at another model.
     """
     leader = standing.best
     return [
@@ -268,9 +269,9 @@ def as_good_with_less(standing: AxisPosterior) -> list[RankedHypothesis]:
 
 
 def of_one_formula(standing: AxisPosterior) -> list[RankedHypothesis]:
-    """Return the rivals that are held against the winner by next to nothing, and near enough for that.
+    """Return the rivals with an exact formula that come near a leader with an exact formula.
 
-    Fits that ended early are no ground for it.
+    They need a full fit before they are compared, since such small differences decide.
     """
     first = standing.best
     least = first.score - NEXT_TO_NOTHING

@@ -1,8 +1,8 @@
-"""What the simulator's own parameters pay for being bent: their prior, as far as the data hold them there.
+"""The price of own parameters that a fit bends away from their nominal values [nats].
 
-A fit weighs every sample, and takes masses and stiffnesses along by what neighbouring errors share. The belief
-weighs far fewer independent ones. By its weights bent parameters may go back, where hardly anything is lost by
-that; where much is, they stay and their prior counts. The cheaper of both is the price.
+A fit counts every sample as independent, so it moves masses and stiffnesses for errors that neighbouring samples
+share. The belief counts far fewer independent samples. With its weights, a bent parameter may either return at the
+cost of some likelihood, or stay and pay its prior. The price is the cheaper of both.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ Array = NDArray[np.float64]
 
 
 def price_of_bending(fitted: FittedModel, weight: Array) -> float:
-    """Return the least of what priors, and data as the belief weighs them, say against a model [nats].
+    """Return the least price of the priors and of the data, weighed as the belief weighs them [nats].
 
-    Half of ``min_s chi2(s) + sum_b weight_b (2 g_b s + s M_b s)`` over steps s from where the fit ended: chi2 of the
-    priors of own parameters, and the loss of each block to second order. ``weight`` (n_blocks,): nats of the belief
-    for each of those of the fit.
+    Half of ``min_s chi2(s) + sum_b weight_b (2 g_b s + s M_b s)`` over steps s from the end of the fit. chi2 is that of
+    the own parameters' priors; the sum is the loss of each block to second order. ``weight`` (n_blocks,): nats in the
+    belief for one nat of the fit.
     """
     kept = _KEPT.setdefault(fitted, {})
     key = weight.tobytes()
@@ -32,7 +32,7 @@ def price_of_bending(fitted: FittedModel, weight: Array) -> float:
     return kept[key]
 
 
-# Prices of models by weights: axes and rounds of refinement ask for them again and again.
+# Prices by model and weights, since axes and refinements ask for the same ones many times.
 _KEPT: WeakKeyDictionary[FittedModel, dict[bytes, float]] = WeakKeyDictionary()
 
 

@@ -1,8 +1,8 @@
-"""Effects that nobody can tell apart by the logs of commands and motor angles: said, not hidden.
+"""Equivalent effects: they give the same logs of commands and motor angles.
 
-A torque that is reported with an offset gives the very logs of one that has it; of an axis alone a
-position that is read late those of a torque that is applied late. The usual one of such twins is tried
-and named; the others stand beside it with a share of its probability.
+A torque sensor with an offset gives the logs of an axis with a torque offset. On a single axis, a position that is
+read late gives the logs of a torque that is applied late. The more common effect of such a set is tried and named;
+the others get a share of its probability.
 """
 
 from __future__ import annotations
@@ -15,21 +15,20 @@ from axisight.gap.facts.named_cause import NamedCause
 from axisight.gap.facts.result import Candidate
 
 TWIN_SHARE = 0.2
-"""How often it is the twin, of machines that give such logs: as nothing tells, what is usual has the odds
-of four to one."""
+"""Prior probability of the less common effect of two equivalent ones: odds of four to one for the common one."""
 
 
 def twins_of(effect: str, n_axes: int) -> tuple[str, ...]:
-    """Return the effects that give the very same logs of a robot.
+    """Return the effects that give the same logs of a robot with ``n_axes`` axes.
 
-    What is late on one axis of several is none: the others feel its motion when it is.
+    A late position is equivalent to a late torque on a robot of one axis only: other axes feel the motion itself.
     """
     info = effect_info(effect)
     return () if info.twins_alone and n_axes > 1 else info.twins
 
 
 def with_twins(ranking: Sequence[Candidate], n_axes: int) -> tuple[Candidate, ...]:
-    """Return the ranking with twins beside those they are twins of, each with its share."""
+    """Return the ranking with equivalent effects added, each with its share of the probability."""
     out = []
     for one in ranking:
         names = twins_of(one.effect, n_axes)
@@ -39,7 +38,7 @@ def with_twins(ranking: Sequence[Candidate], n_axes: int) -> tuple[Candidate, ..
 
 
 def less_their_twins(causes: Sequence[NamedCause], n_axes: int) -> tuple[NamedCause, ...]:
-    """Return the causes without the share of probability that their twins have."""
+    """Return the causes less the probability of their equivalent effects."""
     counts = [len(twins_of(c.effect, n_axes)) for c in causes]
     return tuple(
         c.adjusted("twins", 1 - TWIN_SHARE * count) if count else c
@@ -48,20 +47,21 @@ def less_their_twins(causes: Sequence[NamedCause], n_axes: int) -> tuple[NamedCa
 
 
 def open_twins(causes: Sequence[NamedCause], n_axes: int) -> tuple[tuple[str, ...], ...]:
-    """Return the sets of labels that stay open, one for each cause that has twins."""
+    """Return the sets of equivalent labels, one for each cause that has any."""
     named = [(c, (c.effect, *twins_of(c.effect, n_axes))) for c in causes]
     return tuple(tuple(Effect(n, c.axis).label for n in s) for c, s in named if len(s) > 1)
 
 
 def about_twins(causes: Sequence[NamedCause], n_axes: int) -> tuple[str, ...]:
-    """Return a sentence for each cause that has twins."""
+    """Return a sentence for each cause that has equivalent effects."""
     out = []
     for c in causes:
         there = "" if c.axis is None else f" on axis {c.axis}"
+        name = phrase(c.effect)
         others = " or ".join(phrase(n) for n in twins_of(c.effect, n_axes))
         if others:
             out.append(
-                f"The logs of {phrase(c.effect)}{there} are those of {others}: what is met more "
-                "often is named. A second sensor, on the joint or of the torque, would tell."
+                f"{name[:1].upper()}{name[1:]}{there} gives the same logs as {others}. The more common effect "
+                "is named. A second sensor (joint encoder or torque sensor) tells them apart."
             )
     return tuple(out)

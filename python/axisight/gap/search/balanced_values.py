@@ -1,9 +1,8 @@
-"""Values of causes, and of the simulator's own parameters, where the model leaves more than noise.
+"""Values of causes and own parameters where the model leaves more than noise.
 
-A real machine is off any rigid model by many times its noise, over stretches of time. Weighed as noise,
-such errors outvote all that is known of masses and friction beforehand: these go to the edge of
-their tolerance for what is not theirs, and take the value of the cause along. Here the errors of
-every axis count for as much as they tell.
+A real machine differs from any rigid model by many times its noise, with errors that last. Counted as independent
+noise, they outvote the tolerances: masses and friction go to the edge of their tolerance, and bias the cause. Here the
+errors of each axis are weighed by what they tell (composite likelihood).
 """
 
 from __future__ import annotations
@@ -22,15 +21,15 @@ from axisight.statistics.intervals import NORMAL_DEVIATIONS, student_factor
 
 Array = NDArray[np.float64]
 
-# Blocks of an axis from which their scatter tells how much its errors count for.
+# Least number of blocks of an axis to estimate the scatter of its errors.
 _BLOCKS = 8
 
 
 def with_balanced_values(found: SearchState, fitter: ModelFitter) -> SearchState:
-    """Return the search with values that weigh the data against tolerances as the errors left ask for.
+    """Return the search with values fitted again, with data and tolerances weighed by the errors that are left.
 
-    What was found, and what it explains, stays. Only where errors of axes add up: a closed loop that
-    leaves more than noise has no causes.
+    Causes and what they explain stay. By inverse dynamics only: in closed loop, a model that leaves more than noise has
+    no causes.
     """
     if not fitter.adds_up:
         return found
@@ -56,12 +55,11 @@ def _balanced(model: FittedModel, fitter: ModelFitter) -> FittedModel:
 
 
 def inflation(model: FittedModel) -> Array:
-    """Return by how much the gradient of every axis scatters more than its weights say (n_axes,), one at least.
+    """Return by how much the gradient of every axis scatters more than its weights say (n_axes,), at least one.
 
-    tr(H^-1 J) / tr(H^-1 A), with A the normal equations of the axis, H these and the tolerances, and J the
-    scatter of its gradient between blocks: one where errors are independent and of the size that the
-    weights have them. The magnitude adjustment of composite likelihoods (Pauli, Racugno and Ventura
-    2011, Statistica Sinica 21(1)).
+    tr(H^-1 J) / tr(H^-1 A), with A the normal equations of the axis, H these plus the tolerances, and J the
+    scatter of the gradient between blocks. It is one if errors are independent and as large as the weights say.
+    This is the magnitude adjustment of composite likelihoods (Pauli, Racugno and Ventura 2011, Statistica Sinica 21(1)).
     """
     out = np.ones(int(model.axis.max()) + 1)
     if not model.parameters:
@@ -81,11 +79,10 @@ def inflation(model: FittedModel) -> Array:
 
 
 def deviations(model: FittedModel) -> dict[tuple[int | None, str], float]:
-    """Return the standard deviation of every parameter as if there were many stretches of time.
+    """Return the standard deviation of every parameter, by a jackknife over stretches of time, all axes together.
 
-    What the estimate scatters by where each stretch of time is left out in turn, all axes together
-    (jackknife; few stretches scatter more than their sandwich shows), and what the tolerances leave open, in
-    squares; times the quantile of Student's distribution over that of the normal one.
+    The variance of the tolerances is added. The result is scaled by the ratio of Student's to the normal quantile, so
+    that intervals can be made as for a normal distribution.
     """
     stretch = _stretches(model)
     count = int(stretch.max()) + 1
@@ -115,7 +112,7 @@ def deviations(model: FittedModel) -> dict[tuple[int | None, str], float]:
 
 
 def _stretches(model: FittedModel) -> NDArray[np.int64]:
-    """Return the number of the stretch of time of every block (n_blocks,), one and the same on all axes."""
+    """Return the number of the stretch of time of every block (n_blocks,), the same on all axes."""
     place = np.zeros(len(model.axis), dtype=np.int64)
     for log in np.unique(model.log):
         for axis in np.unique(model.axis):

@@ -1,7 +1,7 @@
-"""Composites and their parts: which of them a gap is named by.
+"""Composites and their parts: names a gap by the parts where they explain as much.
 
-A friction that is larger one way is a dry friction and an offset. Where one of these, or both, do as well, a composite
-is not what is missing.
+Asymmetric friction is Coulomb friction plus an offset. If one of these, or both, explain as much, the composite is not
+the cause.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from axisight.statistics.tails import normal_deviate
 Found = tuple[RankedHypothesis, AxisPosterior]
 
 SHOWS_BESIDE = normal_deviate(0.025)
-"""What each of a pair that is a cause together has to show beside the other [standard deviations]: the pair has passed
-the test of the whole family, its two members are held against one another."""
+"""Significance that each of a pair needs beside the other [standard deviations]. The pair as a whole has passed the test
+against false alarms of all candidates."""
 
 
 def named_simply(led: AxisPosterior, fitter: ModelFitter, state: SearchState) -> Sequence[Found]:
-    """Return the cause that leads a standing, or what it is made of where that does as well."""
+    """Return the leading cause, or its parts where they explain as much."""
     if fitter.adds_up:
         whole = _without_rival_composites(led)
         return _in_parts(led, fitter, state.model, state.layout) or ((whole.best, whole),)
@@ -71,9 +71,9 @@ def _simpler(standing: AxisPosterior, fitter: ModelFitter) -> AxisPosterior:
 
 
 def _without_rival_composites(standing: AxisPosterior) -> AxisPosterior:
-    """Return the standing with the winner in the place of composites that it is a part of.
+    """Return the posterior with composites that contain the leader joined into the leader.
 
-    Whether their other part is there too is a question of its own, asked once the winner is in.
+    A later round asks whether their other part is there too.
     """
     winner = standing.best.trial.hypothesis.effect
     composed = [
@@ -88,10 +88,9 @@ def _without_rival_composites(standing: AxisPosterior) -> AxisPosterior:
 def _in_parts(
     standing: AxisPosterior, fitter: ModelFitter, model: FittedModel, layout: Layout
 ) -> tuple[Found, ...]:
-    """Return the parts of a composite that leads an axis, where they do as well; else none.
+    """Return the parts of a leading composite if they explain as much; else none.
 
-    Those of its two parts that show beside the other: an asymmetric friction may be a Coulomb
-    friction and an offset, or one of them.
+    Only parts that are significant beside the other: asymmetric friction may be Coulomb friction, an offset, or both.
     """
     winner = standing.best
     effect = winner.trial.hypothesis.effect
@@ -121,7 +120,7 @@ def _in_parts(
 def _needed(
     alone: Sequence[FittedHypothesis], both: Sequence[FittedHypothesis], layout: Layout, axis: int
 ) -> Sequence[FittedHypothesis]:
-    """Return the trials of those parts that show beside the other; the first if none does."""
+    """Return the trials of the parts that are significant beside the other; the first if none is."""
     if len(both) < 2:
         return both
     sure = [
@@ -136,7 +135,7 @@ def _needed(
 def parts_of(
     composite: Effect, bounds: Mapping[str, tuple[float, float]], known: Collection[str]
 ) -> list[Hypothesis]:
-    """Return the parts of a composite whose labels are not known, with the shape that the composite has."""
+    """Return the parts of a composite that are not ``known`` by label, with the composite's shape parameters."""
     free = [_part(name, composite, bounds) for name in effect_info(composite.name).parts]
     return [f for f in free if f.effect.label not in known]
 
@@ -144,13 +143,13 @@ def parts_of(
 def fitted_with(
     fitter: ModelFitter, free: Sequence[Hypothesis], start: FittedModel, *, lazy: bool = False
 ) -> FittedHypothesis | None:
-    """Return the last of the effects ``free`` beside the others; None if it cannot be simulated."""
+    """Return the last of the effects ``free`` fitted beside the others; None if it diverges."""
     found = fitter.fit(free, start, lazy=lazy)
     return None if isinstance(found, Diverged) else trial(free[-1], found)
 
 
 def all_fitted(trials: Iterable[FittedHypothesis | None]) -> list[FittedHypothesis] | None:
-    """Return trials as far as all can be simulated; None from the first that cannot."""
+    """Return the trials; None if one of them diverged."""
     found = []
     for one in trials:
         if one is None:
@@ -160,7 +159,7 @@ def all_fitted(trials: Iterable[FittedHypothesis | None]) -> list[FittedHypothes
 
 
 def _part(name: str, composite: Effect, bounds: Mapping[str, tuple[float, float]]) -> Hypothesis:
-    """Return a part of a composite, with the shape that the composite has."""
+    """Return a part of a composite, with the composite's shape parameters."""
     given = composite.parameters or {}
     info = effect_info(name).parameters
     values = {p.name: given.get(p.name, p.neutral) for p in info}

@@ -1,4 +1,4 @@
-"""Sets of causes that differ in one place, held against one another: how every move is decided."""
+"""Decides every move: compares sets of causes that differ in one place."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 class Context:
     """What moves work with: the fitter, the state that they change, and the hypotheses ``offered``.
 
-    ``last``: how the axes stood in the last round of the search.
+    ``last``: the posteriors of the axes in the last round of the search.
     """
 
     fitter: ModelFitter
@@ -40,7 +40,7 @@ class Context:
 
 @dataclass(frozen=True)
 class Alternative:
-    """An effect that may be in the place of causes, and a model to fit it from; by default the one without them."""
+    """An effect that may replace causes, and the model where its fit starts; by default the model without them."""
 
     hypothesis: Hypothesis
     start: FittedModel | None = None
@@ -48,13 +48,16 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Proposal:
-    """Causes of a model, and what may be there instead.
+    """Causes of a model, and what may replace them.
 
-    ``gone``: the causes; ``instead``: one of these in their place. ``or_none``: nothing in their place, where they
-    are *needless*, or where it is *doubtful* whether an effect of the library is what they stand for. ``axis``
-    (from 0): where all are judged, or ``everywhere``. ``leeway``: share of what the causes explain that one in their
-    place may leave more, since formulas of it differ as much. ``as_entered``: what takes the place of a cause that
-    it could not be told from keeps the probability that it had then.
+    - ``axis`` (from 0): where the sets are compared; ``everywhere``: on all axes together.
+    - ``gone``: the causes in question; ``instead``: one of these may replace them.
+    - ``or_none``: they may also go out without replacement, if they are *needless*, or if it is *doubtful* that an
+      effect of the library explains the axis.
+    - ``leeway``: share of the explained loss that a replacement may leave more, for its formula error.
+    - ``as_entered``: a replacement keeps the probability that it had when the cause was added.
+    - ``entered``: the posterior when the cause was added, if ``instead`` holds all its open rivals. If the cause stays,
+      it gets the probability that it has beside all other causes.
     """
 
     axis: int
@@ -74,9 +77,9 @@ class Proposal:
 
 @dataclass(frozen=True)
 class Decision:
-    """What takes the place of causes: a model, and how what is new in it stands; nothing new where they go out.
+    """The model that is taken, and the posterior led by the effect that is new in it; None if causes only went out.
 
-    The same model where a cause stays, with how it stands beside the others.
+    If a cause stays and was judged again, the model is the present one and the posterior is the new one of that cause.
     """
 
     model: FittedModel
@@ -84,7 +87,7 @@ class Decision:
 
 
 def decided(context: Context, proposal: Proposal) -> Decision | None:
-    """Return what takes the place of causes, or how they stand; None where they stay as they stood."""
+    """Return the decision on a proposal; None if the causes stay with the probability that they have."""
     fitter, model = context.fitter, context.state.model
     rest = [f for f in model.free if f.effect.label not in proposal.labels]
     if proposal.or_none == "needless":
@@ -109,7 +112,7 @@ def decided(context: Context, proposal: Proposal) -> Decision | None:
 
 
 def _without(context: Context, proposal: Proposal, rest: Sequence[Hypothesis]) -> Decision | None:
-    """Return the model without causes, where it leaves no more than what a cause has to take away."""
+    """Return the model without the causes if its loss rises by less than a cause must remove."""
     model = context.state.model
     found = settled(context.fitter, rest, model)
     if isinstance(found, Diverged):
@@ -121,12 +124,12 @@ def _without(context: Context, proposal: Proposal, rest: Sequence[Hypothesis]) -
 
 
 def _is_none(standing: AxisPosterior) -> bool:
-    """Whether nothing, or something unknown, is likelier than what leads."""
+    """Whether *none* and *unknown* together are likelier than the leader."""
     return standing.p_none + standing.p_unknown > standing.best.probability
 
 
 class _Contest:
-    """Sets of causes with the same rest: fits, and how they stand."""
+    """Fits and posteriors of sets of causes that share all but the causes in question."""
 
     def __init__(self, context: Context, proposal: Proposal, without: FittedModel) -> None:
         self.fitter, self.state, self.settings = context.fitter, context.state, context.settings
@@ -135,14 +138,14 @@ class _Contest:
         self.place = None if proposal.everywhere else proposal.axis
 
     def tried(self, rest: Sequence[Hypothesis], one: Alternative) -> FittedHypothesis | None:
-        """Return an alternative beside the rest; None if it cannot be simulated, or contains some of the rest."""
+        """Return an alternative fitted beside the rest; None if it diverges, or if it contains an effect of the rest."""
         if len(kept_beside(rest, one.hypothesis)) < len(rest):
             return None
         found = self.fitter.fit([*rest, one.hypothesis], one.start or self.without, lazy=True)
         return None if isinstance(found, Diverged) else trial(one.hypothesis, found)
 
     def standing(self, trials: Sequence[FittedHypothesis]) -> AxisPosterior | None:
-        """Return how single effects stand in the place in question."""
+        """Return the posterior of single effects in the place in question; None if none lowers the loss."""
         found = stand(
             trials,
             held_out_loss(self.without),
@@ -157,7 +160,7 @@ class _Contest:
     def one_for(
         self, several: FittedHypothesis, rivals: Sequence[FittedHypothesis]
     ) -> Decision | None:
-        """Return the first effect, the most probable before others, that is likelier than several; None without."""
+        """Return the decision for the most probable effect that is likelier than several causes; None if none is."""
         first = self.standing(rivals)
         standing = None if first is None else self.standing(self.with_second_fits(first, several))
         if standing is None:
@@ -166,12 +169,12 @@ class _Contest:
         for ranked in standing.ranked:
             if set_likelier(ranked.trial, several, self.without, floor, self.layout, self.place):
                 return self.decision(standing)
-            # What leaves more than that is none in their place.
+            # An effect that leaves more cannot replace them.
             standing = standing.without(ranked.trial.label)
         return None
 
     def decided(self, standing: AxisPosterior, present: FittedHypothesis) -> Decision | None:
-        """Return the decision for what leads; where a cause stays, how it does, if all its open rivals were tried."""
+        """Return the decision for the leader. A cause that stays is judged again if all its open rivals were tried."""
         entered = self.proposal.entered
         if entered is not None:
             standing = standing.told_by_other_axes(entered)
@@ -183,11 +186,11 @@ class _Contest:
         return Decision(self.state.model, judged)
 
     def decision(self, standing: AxisPosterior) -> Decision:
-        """Return the decision for what leads."""
+        """Return the decision for the leader."""
         return Decision(standing.best.trial.fitted, replace(standing, axis=self.proposal.axis))
 
     def _floor_for(self, several: FittedHypothesis) -> Array:
-        """Return the floor (n_blocks,), raised by what one in the place of several may leave more than they do."""
+        """Return the floor (n_blocks,), raised on the axis by what one effect may leave more than several."""
         here = self.layout.of(self.place)
         least = float(self.state.floor[here].sum())
         left = float(several.held_out[here].sum())
@@ -200,9 +203,9 @@ class _Contest:
     def with_second_fits(
         self, standing: AxisPosterior, present: FittedHypothesis
     ) -> list[FittedHypothesis]:
-        """Return the trials with sensitivities of their own: all rivals of one cause, the best of several causes.
+        """Return the trials, fitted again with their own sensitivities: all rivals of one cause, the best of several.
 
-        One that cannot be simulated with these is none.
+        A trial that diverges is left out.
         """
         rivals = [r.trial for r in standing.ranked if r.trial is not present]
         best = min(rivals, key=lambda t: float(t.held_out.sum()), default=None)

@@ -1,7 +1,7 @@
-"""The moves that judge causes anew: which there are, in which order, and where each makes sense.
+"""The table of moves that change a set of causes: their order, and when each applies.
 
-A new one is a function that proposes other sets of causes, an entry here, and its name with what it does in
-`axisight.gap.facts.trace.MOVES`. Whether a set is taken is decided in `axisight.gap.search.contest` alone.
+To add a move: write a function that proposes sets, add an entry here, and add its name and sentence to
+`axisight.gap.facts.trace.MOVES`. Only `axisight.gap.search.contest` decides whether a set is taken.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from axisight.gap.search.state import OPEN, Round, SearchState
 
 @dataclass(frozen=True)
 class Move:
-    """A move: what it is called, and which sets it proposes in a context.
+    """A move: its name, and the function that proposes sets of causes.
 
-    ``in_loops_only``: it makes sense where the errors of axes do not add up, in a closed loop. ``then``: moves that
-    follow where it changed something.
+    ``in_loops_only``: only in closed loop, where the errors of the axes do not add up. ``then``: moves that follow if
+    this one changed the set.
     """
 
     name: str
@@ -43,7 +43,7 @@ AT_THE_END = (
 
 
 def make(moves: Sequence[Move], context: Context) -> set[str]:
-    """Make moves in order, each as long as one of its sets is taken; return the labels of causes that went out."""
+    """Make moves in order, each until none of its sets is taken; return the labels of the causes that went out."""
     before = {f.effect.label for f in context.state.model.free}
     for move in moves:
         if move.in_loops_only and context.fitter.adds_up:
@@ -58,10 +58,10 @@ def make(moves: Sequence[Move], context: Context) -> set[str]:
 
 
 def _made(move: Move, context: Context, tried: set[tuple[frozenset[str], frozenset[str]]]) -> bool:
-    """Take the first set of a move that is likelier than what there is; return whether there is one."""
+    """Take the first proposed set that is likelier than the present one; return whether there is one."""
     labels = frozenset(f.effect.label for f in context.state.model.free)
     for proposal in move.proposals(context):
-        # The same causes beside the same others were judged before.
+        # Each set is judged once.
         key = labels - proposal.labels, proposal.labels
         if key in tried:
             continue
@@ -73,7 +73,7 @@ def _made(move: Move, context: Context, tried: set[tuple[frozenset[str], frozens
 
 
 def _taken(name: str, context: Context, proposal: Proposal, decision: Decision) -> bool:
-    """Take a set of causes into the state, with how what is new in it stood; return whether it is another set."""
+    """Put a decision into the state: the model and the new posterior. Return whether the set of causes changed."""
     state, standing = context.state, decision.standing
     if decision.model is state.model:
         if standing is not None:
@@ -83,14 +83,14 @@ def _taken(name: str, context: Context, proposal: Proposal, decision: Decision) 
     if standing is not None and proposal.as_entered:
         standing = _as_entered(state, proposal, standing)
     state.moved(name, decision.model)
-    # What was a cause before, and does it alone now, stands as it did, with all its rivals.
+    # A remaining cause keeps its posterior, with all its rivals.
     if standing is not None and standing.best.trial.label not in before:
         state.rounds.append(Round((standing,), ((standing.best, standing),), left))
     return True
 
 
 def _as_entered(state: SearchState, proposal: Proposal, standing: AxisPosterior) -> AxisPosterior:
-    """Return what takes the place of a cause as it stood beside that; there it had all its rivals."""
+    """Return the posterior when the replaced cause was added, led by the effect that replaces it."""
     label = standing.best.trial.label
     for cause, entered in state.accepted:
         if cause.trial.label in proposal.labels:
@@ -99,15 +99,15 @@ def _as_entered(state: SearchState, proposal: Proposal, standing: AxisPosterior)
     return standing
 
 
-# Steps of the last fit.
+# Most steps of the last fit.
 _FINISHING = 12
 
 
 def finish(fitter: ModelFitter, state: SearchState) -> None:
-    """Fit on where a step still promises more than noise leaves open.
+    """Continue the fit of the model while a linear step promises a fall of the loss by more than one.
 
-    A share of a large loss, at which fits end, may be many standard deviations along a flat valley, such
-    as that of a load and the mass of the link that carries it.
+    Fits end at a share of the loss. In a flat valley, such as that of a load and the mass of the link that carries it,
+    that share may be several standard deviations.
     """
     model = state.model
     if not model.free or model.stuck or linear_gain(model) < OPEN:

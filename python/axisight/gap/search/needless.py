@@ -1,4 +1,4 @@
-"""Causes that the others have made needless, or that stand for something no effect of the library is."""
+"""Proposes to remove causes: those that others made needless, and those that *unknown* may explain better."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from axisight.gap.search.contest import Context, Proposal
 
 
 def needless(context: Context) -> Iterator[Proposal]:
-    """Propose to go on without one cause: what takes away too little by a linear step, least first, or stands in.
+    """Propose the set without one cause, for causes that remove too little by a linear step, the least first.
 
-    A load that came in beside a link with another centre of mass lies elsewhere itself, further than one step
-    goes: a cause of the family of an effect of the whole arm is always tried.
+    Causes of the family of an effect of the whole arm are always proposed. A payload that was added beside a wrong
+    centre of mass settles elsewhere, further away than one linear step predicts.
     """
     free = context.state.model.free
     if len(free) < 2:
@@ -38,7 +38,7 @@ def _without(cause: Hypothesis) -> Proposal:
 
 
 def _taken_away(context: Context, cause: Hypothesis) -> float:
-    """Return the mean square that a cause takes away, where the others take one linear step without it."""
+    """Return the rise of the mean square without a cause, after one linear step of the others."""
     model, axis = context.state.model, cause.effect.axis
     others = [f for f in model.free if f is not cause]
     without = context.fitter.evaluate(others, model, robot_values=model.robot_values)
@@ -50,10 +50,10 @@ def _taken_away(context: Context, cause: Hypothesis) -> float:
 
 
 def doubtful(context: Context) -> Iterator[Proposal]:
-    """Propose to go on without causes that something unknown was likelier than as they came in.
+    """Propose the set without one cause, for causes that were less likely than *unknown* when they were added.
 
-    One that explains a small part of its axis is a cause if others explain the rest. What came in beside one that
-    went out since is in doubt, too.
+    Causes that were added beside a withdrawn cause are proposed too. A cause that explains a small part of its axis may
+    stay if others explain the rest.
     """
     state = context.state
     steps = [step for step in state.steps if step.move == "withdraw"]

@@ -1,7 +1,7 @@
-"""One effect in the place of several: what two laws on an axis imitate together may be a third.
+"""Proposes one effect in the place of several causes.
 
-A search that takes in the best of each round may begin with the wrong law, as long as causes
-elsewhere are missing, and mend it with another one.
+While causes elsewhere are missing, a search may add the wrong law first and a second law that corrects it. Together
+they imitate a third one.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Groups = dict[tuple[int, str], list[Hypothesis]]
 
 
 def merged(context: Context) -> Iterator[Proposal]:
-    """Propose one effect for several of a family on an axis, or for a load that may be one change of its link."""
+    """Propose one effect for several causes of one family and axis, or for a load that may be a change of its link."""
     model = context.state.model
     groups = {**several_together(model), **_lone_load(model, context.state.layout.n_axes)}
     if not context.fitter.adds_up:
@@ -29,7 +29,7 @@ def merged(context: Context) -> Iterator[Proposal]:
             axis - 1,
             tuple(several),
             tuple(Alternative(o) for o in others),
-            # A load shows on every axis that carries it, and has to do on all.
+            # A load shows on every axis that carries it, so it is compared on all.
             everywhere=_is_load(several[0]),
             leeway=0.0 if context.fitter.adds_up or len(several) == 1 else _leeway(several),
             as_entered=len(several) == 1,
@@ -37,10 +37,9 @@ def merged(context: Context) -> Iterator[Proposal]:
 
 
 def _leeway(several: Sequence[Hypothesis]) -> float:
-    """Return the share of what several explain that one in their place may leave more.
+    """Return the share of the explained loss that one effect may leave more than several.
 
-    Of laws of a gear what formulas of it differ by, and of loads, which are rigid bodies, what is left of other
-    laws; of others nothing.
+    The formula error for laws of a gear and for loads, else zero.
     """
     laws = [effect_info(f.effect.name) for f in several]
     if all(law.of_gear for law in laws) or all(law.carried for law in laws):
@@ -51,9 +50,9 @@ def _leeway(several: Sequence[Hypothesis]) -> float:
 def _others(
     axis: int, family: str, several: Sequence[Hypothesis], options: Sequence[Hypothesis]
 ) -> list[Hypothesis]:
-    """Return what may take the place of several effects: of their family, with no more numbers than they need.
+    """Return the effects that may replace several: of their family, with no more numbers.
 
-    Of effects of several families only what has the first as a part.
+    If the several are of different families: only composites that contain the first as a part.
     """
     labels = {f.effect.label for f in several}
     count = sum(map(numbers, several))
@@ -69,16 +68,16 @@ def _others(
         return [o for o in new if first in effect_info(o.effect.name).parts and numbers(o) <= count]
     if len(several) == 1:
         return [o for o in new if numbers(o) < count]
-    # One of them may do it alone from where it is now, and could not from its start.
+    # One of them may suffice from its present values, even if it did not from its start values.
     most = count if _is_load(several[0]) else count - 1
     return [o for o in (*new, *several) if numbers(o) <= most]
 
 
 def _beside_a_part(model: FittedModel) -> Groups:
-    """Return parts of composites, each with a cause of another family on its axis, by axis and family.
+    """Return first parts of composites with the one other cause of their axis, by axis and family.
 
-    A search names the first part where the others do as well, and what it finds then may be the second, by
-    whatever name: a balancer for an offset.
+    The search names a composite by its first part if that does as well. The cause that it adds next may stand for the
+    second part under another name, such as a balancer for an offset.
     """
     composites = [info for info in effect_table().values() if info.parts]
     found: Groups = {}
@@ -101,7 +100,7 @@ def several_together(model: FittedModel) -> Groups:
 
 
 def _lone_load(model: FittedModel, n_axes: int) -> Groups:
-    """Return a load with the axis of the link that carries it, where that has no other change of the kind."""
+    """Return a single load with the axis of the link that carries it, if no cause changes that link."""
     loads = [f for f in model.free if f.effect.axis is None and _is_load(f)]
     links = [f for f in model.free if f.effect.axis == n_axes and _is_load(f)]
     if len(loads) != 1 or links:

@@ -1,8 +1,7 @@
-"""Pairs of effects on one axis that hide one another when they are tried one at a time.
+"""Pairs of effects on one axis that hide each other when they are tried one at a time.
 
-Where viscous friction and an offset are both missing, each alone leaves the error of the other,
-which drowns its own gain in some stretches of time and turns it round in others: neither looks
-sure. Together both are.
+If viscous friction and an offset are both missing, each alone leaves the error of the other. Its gain then varies
+over time, so neither is significant alone. Together both are.
 """
 
 from __future__ import annotations
@@ -28,10 +27,9 @@ from axisight.statistics.tails import normal_deviate
 
 Array = NDArray[np.float64]
 
-# Candidates of an axis that are tried in pairs.
+# Number of candidates of an axis that are tried in pairs.
 _PARTNERS = 4
-# Share of what is left that each of them explains alone, of what a cause has to: below, there is
-# nothing that hides.
+# Score that each of a pair needs alone, as a share of the score that a cause needs.
 _HINT = 0.2
 
 
@@ -39,7 +37,7 @@ _HINT = 0.2
 class Pair:
     """Two effects that are causes of ``axis`` (from 0) together: ``both`` in one fit.
 
-    ``gain``: fall of the held-out loss there; ``members``: each as it stands beside the other.
+    ``gain``: fall of the held-out loss there; ``members``: each with its posterior beside the other.
     """
 
     axis: int
@@ -49,7 +47,7 @@ class Pair:
 
 
 class Pairs:
-    """Pairs of candidates on top of one model, on the axes where no single one is a cause."""
+    """Pairs of candidates on top of one model, for axes where no single candidate is a cause."""
 
     def __init__(
         self,
@@ -65,9 +63,9 @@ class Pairs:
         self.floor, self.layout, self.settings = floor, layout, settings
 
     def found(self, axis: int, first: float, tried: int) -> Pair | None:
-        """Return the pair that explains most of ``axis`` (from 0), if it is sure.
+        """Return the pair that explains most of ``axis`` (from 0); None if it is not significant.
 
-        ``first``: loss above the floor there before any effect; ``tried``: candidates of the search.
+        ``first``: loss above the floor there before any effect; ``tried``: number of candidates of the search.
         """
         here = self.layout.axis == axis
         left = float((self.current - self.floor)[here].sum())
@@ -88,7 +86,7 @@ class Pairs:
             self.settings.smallest_share * first,
             self.settings.smallest_gain * samples,
         )
-        # As many pairs as there could have been, were all candidates tried.
+        # Bonferroni over all pairs that could have been tried.
         level = self.settings.false_alarms / max(tried * len(mine), 1)
         needed = max(self.settings.significance, normal_deviate(level))
         if not worth or self.layout.significance(self.current, both.held_out, axis) <= needed:
@@ -98,7 +96,7 @@ class Pairs:
         return Pair(axis, both, gain, (one, other)) if one and other else None
 
     def _hints(self, t: FittedHypothesis, axis: int, left: float) -> bool:
-        """Whether a candidate of ``axis`` explains some of what is ``left`` there, and is no ordinary hold."""
+        """Whether a candidate of ``axis`` explains some of the loss ``left`` there and is no ordinary sample and hold."""
         effect = t.fitted.effects[-1]
         if is_lag(effect) and self.fitter.within_tolerance(effect):
             return False
@@ -107,10 +105,10 @@ class Pairs:
         return own and fall > _HINT * self.settings.smallest_score * left
 
     def _taken_apart(self, mine: Sequence[FittedHypothesis]) -> list[FittedHypothesis]:
-        """Return the candidates that are tried in pairs, of all, the best first.
+        """Return the candidates that are tried in pairs, the best first.
 
-        A composite with a number at its bound is another sum of its parts (a constant larger than the dry
-        friction is no friction that is larger one way): they are tried in its place.
+        A composite with a parameter at its bound is replaced by its parts. Example: an offset larger than the dry
+        friction cannot be asymmetric friction.
         """
         partners = list(mine[:_PARTNERS])
         present = {e.label for e in self.model.effects}
@@ -121,7 +119,7 @@ class Pairs:
         return partners
 
     def _parts(self, composite: FittedHypothesis, known: set[str]) -> list[FittedHypothesis]:
-        """Return the parts of a composite that are not known, each on top of the model."""
+        """Return the parts of a composite, each fitted on top of the model; without those already ``known``."""
         effect, bounds = composite.fitted.effects[-1], composite.hypothesis.bounds
         free = parts_of(effect, bounds, known)
         return (
@@ -130,14 +128,14 @@ class Pairs:
         )
 
     def _both(self, one: FittedHypothesis, other: FittedHypothesis) -> FittedHypothesis | None:
-        """Return ``other`` on top of the model with ``one``; None if it cannot be simulated."""
+        """Return ``other`` fitted on top of the model with ``one``; None if it diverges."""
         free = [*one.fitted.free, other.hypothesis]
         return fitted_with(self.fitter, free, one.fitted, lazy=True)
 
     def _beside(
         self, one: str, partner: str, mine: Sequence[FittedHypothesis], axis: int
     ) -> Found | None:
-        """Return how ``one`` stands among the candidates beside its partner, if it leads there."""
+        """Return ``one`` with its posterior beside its partner; None if it does not lead there significantly."""
         base = next(t for t in mine if t.label == partner)
         others = [t for t in mine if t is not base and not _nested(t, base)]
         beside = [x for t in others if (x := self._both(base, t)) is not None]

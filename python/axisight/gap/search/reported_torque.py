@@ -1,8 +1,8 @@
-"""What the controller tells of a cause that the machine's motion leaves open.
+"""The controller's law decides where the motion alone cannot.
 
-A drive that reports a share of its torque shows both gains of the controller off by that share, and the
-machine a torque constant off by its inverse. On one axis that lifts, a heavier link does as well as that
-constant; the controller's share, which no link changes, says which it is.
+If a drive reports only a share of its torque, both controller gains seem off by that share, and the torque constant
+by its inverse. On an axis that lifts, a heavier link explains the motion as well as such a constant. No link changes
+the controller's gains, so these tell which one it is.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.screening.screening import kept_beside
 from axisight.gap.search.state import Round, SearchState
 
-# Errors of torque constants range over a tenth either way. One that a share of the controller's asks for
-# may be off by a hundredth: by chance a rival is that in a tenth of cases, for a torque that is reported
-# so always.
+# Greatest difference between a fitted torque constant and the one that the controller's gains ask for, and the odds
+# that such an agreement gives. Errors of torque constants range over 10 % either way, so chance alone agrees within
+# 1 % in a tenth of all cases.
 _OFF = 0.01
 _ODDS = 10.0
-# A share that all logs have is known to this.
+# Standard deviation of a torque constant that the controller's gains tell.
 _KNOWN = 5e-4
 
 

@@ -1,4 +1,4 @@
-"""A rival in the place of a cause: what came in since, or turned out to be none, may have hidden which it is."""
+"""Proposes rivals in the place of a cause whose probability may have changed since it was added."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.search.contest import Alternative, Context, Proposal
 from axisight.gap.search.state import alike
 
-# Rivals of one cause that are tried.
+# Most rivals of one cause that are tried.
 _RIVALS = 3
-# What a rival explained, of what the cause did, where that was judged beside one that is none.
+# Share of the cause's score that a rival needs if the cause was judged beside one that went out.
 _NEARLY = 0.8
 
 
 def exchanged(context: Context) -> Iterator[Proposal]:
-    """Propose the rivals of each cause that was judged otherwise than it stands now, in its place."""
+    """Propose rivals for each cause that was judged beside another set, or with a bent simulator."""
     state = context.state
     final = {f.effect.label for f in state.model.free}
     crooked = bent(context.fitter, state.model) > 0
@@ -45,7 +45,7 @@ def exchanged(context: Context) -> Iterator[Proposal]:
 
 
 def _nearly_as_good(cause: RankedHypothesis, entered: AxisPosterior) -> list[RankedHypothesis]:
-    """Return what explained nearly as much as a cause of its axis, as it entered."""
+    """Return the rivals of the same axis that explained nearly as much as a cause when it was added."""
     axis = cause.trial.hypothesis.effect.axis
     near = (r for r in entered.ranked if r.score >= _NEARLY * cause.score)
     return [r for r in near if r is not cause and r.trial.hypothesis.effect.axis == axis]
@@ -54,9 +54,9 @@ def _nearly_as_good(cause: RankedHypothesis, entered: AxisPosterior) -> list[Ran
 def open_rivals(
     cause: RankedHypothesis, entered: Sequence[AxisPosterior]
 ) -> list[RankedHypothesis]:
-    """Return what could not be told from a cause as it entered, the likeliest first.
+    """Return the rivals that could not be told from a cause when it was added, the likeliest first.
 
-    ``entered``: how its round stood.
+    ``entered``: the posteriors of its round.
     """
     label = cause.trial.label
     led = [s for s in entered if s.best.trial.label == label]
@@ -66,9 +66,9 @@ def open_rivals(
 
 
 def mending(cause: RankedHypothesis, standings: Sequence[AxisPosterior]) -> list[RankedHypothesis]:
-    """Return the laws of the gear or the dry friction of a cause that lead its axis beside it.
+    """Return other laws of the same gear or dry friction that lead the axis of a cause beside it.
 
-    Such a law is no second cause. It may be the right one, whose first fit had not come far.
+    Such a law is no second cause. It may be the right one, if its first fit had not converged.
     """
     first = cause.trial.hypothesis.effect
     leading = (s.best for s in standings if s.axis + 1 == first.axis)

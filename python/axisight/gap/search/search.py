@@ -1,4 +1,4 @@
-"""Search for causes: try all, take in the best of every axis, drop what is no longer needed."""
+"""Search for causes: in each round try every effect on every axis, add the best of each axis, then make moves."""
 
 from __future__ import annotations
 
@@ -31,8 +31,7 @@ from axisight.statistics.tails import normal_deviate
 
 Array = NDArray[np.float64]
 
-# Each round takes in a cause on every axis that has one; this many on top of one another are
-# no longer causes but a shape.
+# Each round adds a cause on every axis that has one. More rounds than this fit a shape, not causes.
 _MOST_ROUNDS = 8
 
 
@@ -45,8 +44,8 @@ def search(
 ) -> SearchState:
     """Search for the causes of a gap.
 
-    ``candidates`` makes the candidates from the residual of a model;
-    ``expected`` (n_axes,) is the mean square of a weighted residual of noise.
+    ``candidates``: makes the hypotheses from the residual of a model; ``expected`` (n_axes,): mean square of the
+    weighted residual of noise alone.
     """
     progress("re-fitting the simulator", 0, 1)
     baseline = _refitted(fitter)
@@ -78,7 +77,7 @@ def search(
         trials = round_.refined(round_.run(options, number), options, number)
         standings, taken = _judged(round_, trials, out, settings, len(options))
         if round_.first(standings, trials) not in {r.trial.label for r, _ in taken}:
-            # What others waited for is no cause.
+            # The leader that others waited for is no cause.
             trials = round_.run_waiting(trials, options, number)
             trials = round_.refined(trials, options, number, even_felt=True)
             standings, taken = _judged(round_, trials, out, settings, len(options))
@@ -89,7 +88,7 @@ def search(
             break
         diverged = _take_in(round_, out, taken, progress)
         if diverged is not None:
-            # Together they cannot be simulated: what promised most was none of it.
+            # Together they diverge: refuse the first, which promised most.
             refused.add(taken[0][0].trial.label)
             out.skipped[taken[0][0].trial.label] = str(diverged)
             continue
@@ -102,7 +101,7 @@ def search(
 
 
 def _refitted(fitter: ModelFitter) -> FittedModel:
-    """Return the simulator re-fitted without effects: most of the way on the first halves of the logs."""
+    """Return the re-fitted simulator without effects. The first halves of the logs are fitted first, for speed."""
     halves = fitter.beginnings()
     if halves is None:
         return must_hold(fitter.fit([], refreshes=1))
@@ -116,7 +115,7 @@ def _judged(
     settings: Settings,
     tried: int,
 ) -> tuple[tuple[AxisPosterior, ...], tuple[tuple[RankedHypothesis, AxisPosterior], ...]]:
-    """Return how the trials stand on every axis, and what is taken in, as room permits."""
+    """Return the posterior of every axis, and the causes to add, at most up to ``settings.max_causes``."""
     standings = tuple(round_.standings(trials))
     taken = _taken(round_, trials, standings, state, settings, tried)
     room = settings.max_causes - len(state.model.free)
@@ -131,14 +130,14 @@ def _taken(
     settings: Settings,
     tried: int,
 ) -> tuple[tuple[RankedHypothesis, AxisPosterior], ...]:
-    """Return the winners of all axes that are causes and do not feel one another."""
+    """Return the leaders of all axes that are causes and do not affect each other's axis."""
     fall = falls(trials, round_.current, state.layout)
     place = {t.label: i for i, t in enumerate(trials)}
     found: list[tuple[RankedHypothesis, AxisPosterior]] = []
     leaders: list[tuple[int, int]] = []
 
     def felt_most(s: AxisPosterior) -> tuple[float, float]:
-        # One that leads on several axes is judged where it gains most.
+        # A hypothesis that leads on several axes is judged where it gains most.
         mine = fall[place[s.best.trial.label]]
         return -float(mine.sum()), -float(mine[s.axis])
 
@@ -168,9 +167,9 @@ def _taken(
 
 
 def _beaten_at_home(led: AxisPosterior, causes: Mapping[int, AxisPosterior | None]) -> bool:
-    """Whether another cause leads on the axis of what leads elsewhere, and is of that axis too.
+    """Whether the leader belongs to another axis, and a different effect of that axis leads there.
 
-    How effects of one axis fare on others says little of which of them it is.
+    The effect on other axes tells little about which effect of its own axis it is.
     """
     effect = led.best.trial.hypothesis.effect
     if effect.axis is None or effect.axis == led.axis + 1:
@@ -190,10 +189,10 @@ def _rival_leads(
     state: SearchState,
     settings: Settings,
 ) -> bool:
-    """Whether a rival of what leads a standing, of the same axis, surely leads another one.
+    """Whether a rival of the leader, on the leader's own axis, surely leads another axis.
 
-    By more than what the formulas of the first and of the causes before it may leave there, and rather than
-    nothing or something unknown.
+    It must lead there by more than the formula error of the leader and of the causes so far, and be likelier than
+    *none* and *unknown*.
     """
     first, rival = led.best.trial, other.best.trial
     mine = first.hypothesis.effect.axis
@@ -211,7 +210,7 @@ def _rival_leads(
 
 
 def _leads(led: AxisPosterior, other: AxisPosterior, fall: Array, least: Array) -> bool:
-    """Whether what leads a standing also leads another, by what a cause takes away there."""
+    """Whether the leader of one axis also leads another, by more than a cause must remove there."""
     same = other.best.trial is led.best.trial
     return other.axis != led.axis and same and bool(fall[other.axis] > least[other.axis])
 
@@ -223,7 +222,7 @@ def _pairs(
     settings: Settings,
     tried: int,
 ) -> list[tuple[RankedHypothesis, AxisPosterior]]:
-    """Return the pairs of causes, on axes that do not feel one another, where none shows alone."""
+    """Return pairs of causes on axes where no single cause is significant and that do not affect each other."""
     first = state.layout.by_axis(held_out_loss(state.baseline) - state.floor)
     pairs = Pairs(
         round_.fitter, state.model, trials, round_.current, state.floor, state.layout, settings
@@ -239,16 +238,16 @@ def _pairs(
     return [member for i in kept for member in seen[i].members]
 
 
-# Of candidates that explain nearly as much as the first, one may show more evenly over time.
+# Share of the leader's score from which a candidate may be the cause in its place, if its gain is more even over time.
 _NEARLY = 0.8
 
 
 def _led_by_a_cause(
     standing: AxisPosterior, state: SearchState, settings: Settings, tried: int
 ) -> AxisPosterior | None:
-    """Return the standing led by its first candidate that is a cause, not far behind the winner.
+    """Return the posterior led by its first candidate that is a cause and close to the leader; None if there is none.
 
-    Those before it, which the data do not show evenly enough to be causes, are no rivals.
+    Candidates before it are not significant; they are taken out.
     """
     for k, r in enumerate(standing.ranked):
         near = r.score >= _NEARLY * standing.best.score
@@ -264,11 +263,10 @@ def _is_cause(
     settings: Settings,
     tried: int,
 ) -> bool:
-    """Whether what a candidate explains on an axis is real and worth naming.
+    """Whether a candidate explains enough of an axis, and significantly.
 
-    It is one of ``tried`` candidates, each with two chances (its gain and its size): its
-    significance is held against the level that keeps the false alarms of all of them together at
-    ``settings.false_alarms`` (Bonferroni).
+    The level keeps the false alarms of all ``tried`` candidates together at ``settings.false_alarms`` (Bonferroni).
+    Each has two tests: its gain and its size.
     """
     needed = max(
         settings.significance,
@@ -287,11 +285,11 @@ def _take_in(
     taken: Sequence[tuple[RankedHypothesis, AxisPosterior]],
     progress: Progress,
 ) -> Diverged | None:
-    """Take causes into the model; return how it diverges with them, else nothing."""
+    """Add causes to the model; return how it diverges with them, else None."""
     label = "adding " + ", ".join(r.trial.label for r, _ in taken)
     progress(label, 0, 1)
     start = taken[0][0].trial.fitted
-    # One of a pair that the count of causes has no room for was fitted beside the other.
+    # If only one of a pair fits in `max_causes`, its trial holds both: fit it again without the other.
     if len(taken) == 1 and len(start.free) <= len(state.model.free) + 1:
         free = list(start.free)
     else:
@@ -299,8 +297,8 @@ def _take_in(
         for r, _ in taken:
             new = r.trial.fitted.free[-1]
             free = [*kept_beside(free, new), new]
-    # From the simulator of the first: a gap may have bent the one without it. As far as the last fit
-    # goes: mostly this is it.
+    # Start from the first cause's fit, since a gap may have bent the simulator without it. Fit to the tolerance of the
+    # last fit, since mostly this is the last one.
     found = settled(round_.fitter, free, start, rough=round_.rough, worth=OPEN)
     if isinstance(found, Diverged):
         return found
@@ -312,11 +310,11 @@ def _take_in(
 def _earns_its_gain(
     fitter: ModelFitter, winner: RankedHypothesis, model: FittedModel, least: float
 ) -> bool:
-    """Whether logs are fitted better with an effect, and worse again when it is switched off.
+    """Whether the fit gains by the effect itself, not by moving the other parameters.
 
-    ``least``: what a cause takes away of the loss. A fit with one more effect also moves everything else; where
-    the model was not at its optimum, that may be all it did. And where the simulator's own parameters take up a
-    gap on all logs, what one log tells of them predicts others badly: an effect of no use in fits may mend that.
+    The fit must gain enough against ``least``, the loss that a cause removes, and lose half of that when the effect is
+    switched off. This rules out an effect that only helps an unfinished fit, or one that only improves predictions
+    because own parameters took up a gap.
     """
     fitted = winner.trial.fitted
     others = [replace(f, free=()) for f in fitted.free[:-1]]
@@ -329,5 +327,5 @@ def _earns_its_gain(
 
 
 def _settled(state: SearchState, settings: Settings) -> bool:
-    """Whether what is left on every axis is less than any cause would take away."""
+    """Whether every axis has less loss left than a cause would remove."""
     return bool(np.all(state.left() < state.least_falls(settings)))

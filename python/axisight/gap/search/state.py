@@ -1,4 +1,4 @@
-"""State of a search: the simulator re-fitted, the model with the causes so far, and how each round stood."""
+"""State of a search: the re-fitted simulator, the model with the causes so far, and the posteriors of each round."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ OPEN = 1.0
 
 @dataclass(frozen=True)
 class Round:
-    """One round: how candidates stood on each axis, what was taken in.
+    """One round: the posteriors of the axes, and the causes that were added, each with its posterior.
 
-    ``left`` (n_axes,): held-out loss above the floor before.
+    ``left`` (n_axes,): held-out loss above the floor before the round.
     """
 
     standings: tuple[AxisPosterior, ...]
@@ -38,14 +38,14 @@ class Round:
 
 @dataclass
 class SearchState:
-    """Result of a search.
+    """State and result of a search.
 
-    ``baseline``: the simulator re-fitted without effects; ``model``: with the
-    accepted effects; ``floor`` (n_blocks,): loss of noise alone; ``layout``: where the
-    blocks lie; ``skipped``: candidates that failed, with the reason;
-    ``sensitivities`` by label, of candidates as they were screened last;
-    ``steps``: what each move changed;
-    ``adds_up``: errors add up axis by axis; ``by_axis``: the effects explain their axes, not the arm.
+    - ``baseline``: the re-fitted simulator without effects; ``model``: with the causes so far.
+    - ``floor`` (n_blocks,): the loss of noise alone; ``layout``: axis, log and time of each block.
+    - ``skipped``: candidates that failed, with the reason.
+    - ``sensitivities`` by label, from the last screening of each candidate.
+    - ``steps``: what each move changed.
+    - ``adds_up``: whether the errors of the axes add up; ``by_axis``: whether causes explain single axes, not the arm.
     """
 
     baseline: FittedModel
@@ -61,22 +61,22 @@ class SearchState:
 
     @property
     def accepted(self) -> list[tuple[RankedHypothesis, AxisPosterior]]:
-        """The causes in the model and how they stood when they entered, in the model's order."""
+        """The causes in the model, each with its latest posterior, in the model's order."""
         entered = {r.trial.label: (r, s) for x in self.rounds for r, s in x.accepted}
         return [entered[f.effect.label] for f in self.model.free]
 
     def moved(self, move: str, model: FittedModel) -> None:
-        """Take the model that a move of `axisight.gap.facts.trace.MOVES` makes, and write down what it changed."""
+        """Take the model that a move of `axisight.gap.facts.trace.MOVES` makes, and record what it changed."""
         before, after = (tuple(f.effect.label for f in m.free) for m in (self.model, model))
         self.steps.append(Step(move, before, after, self.model.total, model.total))
         self.model = model
 
     def judged_again(self, standing: AxisPosterior) -> None:
-        """Take how a cause stands beside all others, in the place of how it stood when it came in."""
+        """Record the posterior of a cause beside all other causes. It replaces that from when it was added."""
         self.rounds.append(Round((standing,), ((standing.best, standing),), self.left()))
 
     def standings_of(self, cause: RankedHypothesis) -> tuple[AxisPosterior, ...]:
-        """Return how the round stood in which a cause came in."""
+        """Return the posteriors of the round in which a cause was added or judged again."""
         return next(x.standings for x in self.rounds if any(r is cause for r, _ in x.accepted))
 
     def to_explain(self) -> Array:
@@ -90,21 +90,20 @@ class SearchState:
         return self.layout.by_axis(held_out_loss(self.model) - self.floor)
 
     def counted(self, axis: int | None) -> float:
-        """Return what the residuals of an axis (from 0) count for; where that is None of the one that counts least."""
+        """Return the number of samples that an axis (from 0) counts for; for None that of the smallest axis."""
         samples = self.layout.samples()
         return float(samples.min() if axis is None else samples[axis])
 
     def removed(self) -> Array:
-        """Return how much of it the causes remove, by axis (n_axes,)."""
+        """Return the held-out loss that the causes remove, by axis (n_axes,)."""
         used = predictable(self.model)
         fall = held_out_loss(self.baseline, like=self.model) - held_out_loss(self.model)
         return self.layout.by_axis(np.where(used, fall, 0.0))
 
     def least_falls(self, settings: Settings) -> Array:
-        """Return the fall of the loss of each axis (n_axes,) below which nothing there is a cause.
+        """Return the least fall of the loss of each axis (n_axes,) for a cause.
 
-        In a loop, where errors do not add up axis by axis, what a cause on one axis takes away
-        leaves the error of its formula on every other.
+        In closed loop it includes the formula error of all causes so far, since an error on one axis shows on all.
         """
         formulas = 0.0 if self.adds_up else settings.model_error**2 * float(self.removed().sum())
         return np.maximum(
@@ -113,9 +112,9 @@ class SearchState:
         )
 
     def mends(self, one: FittedHypothesis) -> bool:
-        """Whether a trial mends the formula of a cause: it is another law of the same gear, or of its dry friction.
+        """Whether a trial only corrects the formula of a cause: another law of the same gear or dry friction.
 
-        One that takes away no more on its own axis than what formulas may leave of what was removed there.
+        It removes no more on its own axis than the formula error of the loss already removed there.
         """
         axis = one.hypothesis.effect.axis
         others = [

@@ -1,7 +1,7 @@
-"""Effects that the simulator states itself, and the machine has within the scatter of its type.
+"""Effects that the simulator states, with values that differ only by the scatter between machines.
 
-Dry friction of a machine is a few per cent off that of its simulator, as its viscous friction is. The re-fit makes up
-for viscous friction. An effect is none of its parameters, and would be called a cause.
+Dry friction of a machine differs by a few per cent from its simulator, as viscous friction does. The re-fit adjusts
+viscous friction, but not effects. Without this step, such a difference would be named a cause.
 """
 
 from __future__ import annotations
@@ -16,17 +16,16 @@ from axisight.gap.ranking.likelihood import FORMULA_ERROR
 from axisight.gap.search.state import SearchState
 from axisight.robot import Robot
 
-# Tolerances up to which a value is scatter, and those of what shapes a law, which logs tell less of.
+# Deviation up to which an amplitude is scatter, and a shape parameter, which logs tell less about [tolerances].
 _SCATTER, _OF_SHAPES = 3.0, 10.0
 
 
 def with_scatter_taken(
     robot: Robot, found: SearchState, settings: Settings
 ) -> tuple[Robot, tuple[Finding, ...]]:
-    """Return a simulator with the values found of effects that it states, where these are scatter.
+    """Return the simulator with the found values of its stated effects where these are scatter, and a finding for each.
 
-    Causes are that, or explain no more than one that is. And a finding for each; none where there is none. An
-    effect is known as well as viscous friction is.
+    The tolerance of an effect is that of viscous friction. Without scatter: the robot as given, and no finding.
     """
     tolerance = settings.tolerances_of(robot).get(KNOWN_AS, 0.0)
     fitted = [*_rivals(found), *zip(found.model.free, found.model.effects, strict=False)]
@@ -38,7 +37,7 @@ def with_scatter_taken(
 
 
 def _rivals(found: SearchState) -> Iterator[tuple[Hypothesis, Effect]]:
-    """Yield what explains as much as a cause, and its values: scatter is there before any cause is."""
+    """Yield candidates that explain as much as a cause, with their values, since scatter is likelier than a cause."""
     for winner, standing in found.accepted:
         for rival in standing.ranked:
             if rival.score >= winner.score - FORMULA_ERROR:
