@@ -59,7 +59,8 @@ def inflation(model: FittedModel) -> Array:
 
     tr(H^-1 J) / tr(H^-1 A), with A the normal equations of the axis, H these plus the tolerances, and J the
     scatter of the gradient between blocks. It is one if errors are independent and as large as the weights say.
-    This is the magnitude adjustment of composite likelihoods (Pauli, Racugno and Ventura 2011, Statistica Sinica 21(1)).
+    This is the magnitude adjustment of composite likelihoods (Pauli, Racugno and Ventura 2011, Statistica Sinica
+    21(1)).
     """
     out = np.ones(int(model.axis.max()) + 1)
     if not model.parameters:

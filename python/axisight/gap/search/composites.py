@@ -24,8 +24,8 @@ from axisight.statistics.tails import normal_deviate
 Found = tuple[RankedHypothesis, AxisPosterior]
 
 SHOWS_BESIDE = normal_deviate(0.025)
-"""Significance that each of a pair needs beside the other [standard deviations]. The pair as a whole has passed the test
-against false alarms of all candidates."""
+"""Significance that each of a pair needs beside the other [standard deviations]. The pair as a whole has passed the
+test against false alarms of all candidates."""
 
 
 def named_simply(led: AxisPosterior, fitter: ModelFitter, state: SearchState) -> Sequence[Found]:

@@ -138,7 +138,7 @@ class _Contest:
         self.place = None if proposal.everywhere else proposal.axis
 
     def tried(self, rest: Sequence[Hypothesis], one: Alternative) -> FittedHypothesis | None:
-        """Return an alternative fitted beside the rest; None if it diverges, or if it contains an effect of the rest."""
+        """Return an alternative fitted beside the rest; None if it diverges or contains an effect of the rest."""
         if len(kept_beside(rest, one.hypothesis)) < len(rest):
             return None
         found = self.fitter.fit([*rest, one.hypothesis], one.start or self.without, lazy=True)

@@ -96,7 +96,7 @@ class Pairs:
         return Pair(axis, both, gain, (one, other)) if one and other else None
 
     def _hints(self, t: FittedHypothesis, axis: int, left: float) -> bool:
-        """Whether a candidate of ``axis`` explains some of the loss ``left`` there and is no ordinary sample and hold."""
+        """Whether a candidate of ``axis`` explains some of the loss ``left`` there and is no sample and hold."""
         effect = t.fitted.effects[-1]
         if is_lag(effect) and self.fitter.within_tolerance(effect):
             return False
