@@ -83,6 +83,7 @@ format: $(STAMPS)/test-tools
 docs: $(STAMPS)/docs-tools
 	$(BIN)/python docs/make_effects.py
 	$(BIN)/python docs/make_verdict.py
+	$(BIN)/python docs/make_constants.py
 	$(BIN)/python docs/make_cli.py
 	$(BIN)/python docs/make_gallery.py --page-only
 	$(BIN)/python docs/make_plots.py --page-only

@@ -22,9 +22,9 @@ HEAD = """\
 # Commands
 
 `axisight COMMAND --help` says the same. Outputs replace earlier results of their kind and nothing
-else, unless told to by `--force` ([the rule](diagnosis.md#outputs)). Exit status: 0 done, 1 a search
+else, unless told to by `--force` ([the rule](outputs.md#output-files)). Exit status: 0 done, 1 a search
 did not converge, 2 something was refused, by name; `diagnose --exit-code` adds the verdict. Commands that
-do more than print take `--quiet` (`-q`): errors only ([in a shell](diagnosis.md#in-a-shell)).
+do more than print take `--quiet` (`-q`): errors only ([in a shell](outputs.md#in-a-shell)).
 
 """
 

@@ -138,7 +138,7 @@ def test_the_verdict_is_the_exit_code_where_it_is_asked_for(case, monkeypatch, v
 def test_every_verdict_has_an_exit_code_that_no_error_has(repository):
     assert set(EXIT_CODES) == set(VERDICTS)
     assert not set(EXIT_CODES.values()) & {1, 2}
-    page = (repository / "docs" / "diagnosis.md").read_text("utf-8")
+    page = (repository / "docs" / "outputs.md").read_text("utf-8")
     for place in (page, " ".join(run("diagnose", "--help").output.split())):
         for verdict, code in EXIT_CODES.items():
             assert f"{code} {verdict}" in place.replace(" │ │ ", " ")

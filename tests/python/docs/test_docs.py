@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import axisight
 from axisight import _core
 from axisight.cli import app
+from axisight.gap.constants import constants, settings
 from axisight.gap.facts.trace import MOVES, RULES
 
 MODULES = (
@@ -94,6 +95,27 @@ def test_commands_page_has_the_options_of_the_help(repository: Path) -> None:
         in_words = set(re.findall(r"--[a-z][\w-]*", section)) - shown
         assert shown <= options, command
         assert options <= shown | in_words, command
+
+
+def test_constants_page_is_up_to_date(repository: Path) -> None:
+    script = load_script(repository / "docs" / "make_constants.py")
+    page = (repository / "docs" / "constants.md").read_text(encoding="utf-8")
+    assert page == script.render(), "run `make docs`"
+    assert script.main(["--check"]) == 0
+
+
+def test_pages_of_rules_name_constants_that_exist(repository: Path) -> None:
+    known = {c.name for c in settings()}
+    for one in constants():
+        known |= {f"{Path(one.place).stem}.{name}" for name in one.name.split(", ")}
+    pages = [*(repository / "docs").glob("rules_*.md"), repository / "docs" / "outputs.md"]
+    assert len(pages) > 4
+    for page in pages:
+        named = re.findall(
+            r"`(\w+\.(?:_?[A-Z][A-Z0-9_]*|(?<=Settings\.)\w+))`", page.read_text("utf-8")
+        )
+        assert page.name == "outputs.md" or len(named) > 3
+        assert set(named) - known == set(), page.name
 
 
 def test_gallery_is_up_to_date(repository: Path) -> None:

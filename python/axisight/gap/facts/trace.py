@@ -11,42 +11,42 @@ from typing import Any
 NONE = "none"
 """The hypothesis that nothing is missing on an axis."""
 UNKNOWN = "unknown"
-"""The hypothesis that something is missing which no effect of the library stands for."""
+"""The hypothesis that an effect is missing which the library does not have."""
 
 RULES: Mapping[str, str] = MappingProxyType(
     {
-        "likelihood": "How well it predicts data that were left out of its fit.",
-        "cost": "What its fitted numbers cost (Schwarz 1978).",
-        "own_parameters": "It takes the simulator's own parameters further off their nominal values.",
-        "formula_error": "Formulas of its kind differ by less than those of most effects.",
-        "better_fit": "It fits better with no more numbers and predicts nearly as well: neither is surer.",
-        "plainer_law": "What it adds to a plainer law is not there.",
-        "look_alike": "It is met more often than the leader, which it looks like.",
-        "play_of_gear": "The leader is a gear without stiffness in its middle: that is play.",
-        "not_a_cause": "It is too small, unsure, or no hypothesis any more.",
-        "other_axes": "It explains less than the leader on another axis that the leader explains.",
-        "rival_leads": "A rival of the same axis explains another axis for certain.",
-        "composite": "A composite and its part are one hypothesis: the part has the probability of both.",
-        "simplest_first": "It explains as much with less: it is named first.",
-        "reported_torque": "The controller's gains ask for this torque constant.",
-        "as_entered": "It was not fitted again beside later causes: its odds against the leader are those of before.",
-        "beside_causes": "Other causes of the model are no rivals of it.",
-        "either": "Another cause does the same to the logs, and is as likely.",
-        "twins": "Other effects give the very same logs, and have a share of its probability.",
+        "likelihood": "How well the hypothesis predicts data that were left out of its fit.",
+        "cost": "A price for each number that was fitted (Schwarz 1978).",
+        "own_parameters": "A price for moving the simulator's own parameters off their values.",
+        "formula_error": "Effects of this kind have one accepted formula, so that small differences count.",
+        "better_fit": "It fits the logs as well as the leader and predicts them nearly as well: both are equally likely.",
+        "plainer_law": "The logs do not show what this law adds to a plainer one.",
+        "look_alike": "It resembles the leader and is more common, so that its prior odds are higher.",
+        "play_of_gear": "The leader is a gear without stiffness around its middle, which is backlash.",
+        "not_a_cause": "It is too small or too uncertain, or it is no longer a hypothesis.",
+        "other_axes": "The leader also leads on another axis, where this hypothesis explains less.",
+        "rival_leads": "A rival of the same axis clearly leads on another axis, which counts for all of them.",
+        "composite": "A composite effect and its part count as one hypothesis: the part has the probability of both.",
+        "simplest_first": "It explains nearly as much with fewer numbers, so that it is named first.",
+        "reported_torque": "The controller's gains, as the logs show them, ask for this torque constant.",
+        "as_entered": "It was not fitted again beside later causes, so that its odds against the leader stay.",
+        "beside_causes": "Other causes of the axis are no rivals, so that their probability does not count.",
+        "either": "Another cause gives the same logs and is equally likely.",
+        "twins": "Other effects give exactly the same logs and take a share of its probability.",
     }
 )
-"""Every rule that changes a log-weight, with its reason in one sentence."""
+"""Every rule that changes a log-weight, with the reason in one sentence."""
 
 MOVES: Mapping[str, str] = MappingProxyType(
     {
-        "add": "Took in what leads an axis and is a cause there.",
-        "drop": "Dropped a cause that the others had made needless, or that stood in for an effect of the whole arm.",
-        "merge": "Put one effect in the place of several that it does as well as.",
-        "exchange": "Put a rival in the place of a cause that was judged beside others, or with a bent simulator.",
-        "withdraw": "Took out causes that are less likely than none and something unknown together.",
-        "finish": "Fitted on where a step still promised more than noise.",
-        "reported_torque": "Put in the torque constant that the controller's gains ask for.",
-        "own_axes": "Kept the causes of those axes alone that they explain.",
+        "add": "Added the effect that leads an axis and passes all tests of a cause.",
+        "drop": "Removed a cause that the others make needless, or that stood in for an effect of the whole arm.",
+        "merge": "Replaced several causes by one effect that does as well.",
+        "exchange": "Replaced a cause by a rival that is likelier beside the causes found since.",
+        "withdraw": "Removed causes that are less likely than none and unknown together.",
+        "finish": "Continued the last fit while a step promised more than noise.",
+        "reported_torque": "Set the torque constant that the controller's gains ask for.",
+        "own_axes": "Kept the causes of those axes only that they explain.",
     }
 )
 """Every move of the search, with what it does in one sentence."""
