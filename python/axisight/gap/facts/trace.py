@@ -19,7 +19,7 @@ RULES: Mapping[str, str] = MappingProxyType(
         "cost": "A price for each number that was fitted (Schwarz 1978).",
         "own_parameters": "A price for moving the simulator's own parameters off their values.",
         "formula_error": "Effects of this kind have one accepted formula, so that small differences count.",
-        "better_fit": "It fits the logs as well as the leader and predicts them nearly as well: both are equally likely.",
+        "better_fit": "It fits the logs as well as the leader and predicts nearly as well: both are equally likely.",
         "plainer_law": "The logs do not show what this law adds to a plainer one.",
         "look_alike": "It resembles the leader and is more common, so that its prior odds are higher.",
         "play_of_gear": "The leader is a gear without stiffness around its middle, which is backlash.",
