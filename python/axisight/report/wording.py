@@ -204,15 +204,16 @@ class GapMap:
 
 
 def gap_maps(diagnosis: Diagnosis) -> list[GapMap]:
-    """The band map and every regime map that has cells, in order."""
+    """The band map and every regime map that has cells, in order; of axes that are *none* no cell counts."""
+    quiet = [a.axis for a in diagnosis.axes if a.verdict == "none"]
     candidates = [("Frequency band", "band", diagnosis.band_map)] + [
         (regime_name(name), "bin", data) for name, data in diagnosis.regime_maps.items()
     ]
-    maps = [_gap_map(title, dim, data) for title, dim, data in candidates]
+    maps = [_gap_map(title, dim, data, quiet) for title, dim, data in candidates]
     return [item for item in maps if item is not None]
 
 
-def _gap_map(title: str, dim: str, data: xr.Dataset) -> GapMap | None:
+def _gap_map(title: str, dim: str, data: xr.Dataset, quiet: Sequence[int]) -> GapMap | None:
     if "share" not in data or not {"axis", dim} <= set(data["share"].dims):
         return None
 
@@ -229,6 +230,7 @@ def _gap_map(title: str, dim: str, data: xr.Dataset) -> GapMap | None:
     labels = data[dim].values if dim in data.coords else np.arange(1, share.shape[1] + 1)
     with np.errstate(invalid="ignore"):
         significant = np.isfinite(share) & (significance >= threshold)
+    significant[np.isin(axes, quiet)] = False
     return GapMap(
         title=title,
         axes=tuple(int(axis) for axis in axes),

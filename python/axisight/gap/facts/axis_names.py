@@ -5,18 +5,20 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from axisight.effects import phrase
+from axisight.effects import effect_info, noun, phrase
 
 # Names that say no more than the number of the axis.
 _PLAIN = re.compile(r"(?:axis|joint|j|a|q)?[ _-]?0*(\d+)", re.IGNORECASE)
 # "axis 2", "axes 2 and 3"; more than so many are not told by name, a table has them.
-_MENTION = re.compile(r"\b(axis|axes) (\d+(?:(?:, | and )\d+)*)")
+_MENTION = re.compile(r"\b([Aa]xis|[Aa]xes) (\d+(?:(?:, | and )\d+)*)")
 _MOST = 3
-# Share by which an error may lie above the floor and be noise all the same: both are measured.
+# Share by which a gap may lie above its floor and be noise all the same: both are measured.
 _NOISE = 0.1
-# A gap as given is clear where it is this much of the floor, and above it by what is seen by eye [1]; the
-# re-fit removes it where this much of what is above the floor goes, in squares.
+# A gap is clear from this many times the floor, and from this far above it [1]. The re-fit removes it where it
+# removes this share of what is above the floor, in squares.
 _CLEAR, _SEEN, _REMOVED = 1.5, 0.02, 0.75
+# Share of what is above the floor, in squares, of which causes have to remove more on an axis they explain.
+_HALF = 0.5
 
 
 def own_name(axis: int, names: Sequence[str]) -> str:
@@ -33,9 +35,21 @@ def axis_label(axis: int, names: Sequence[str]) -> str:
 
 
 def placed(label: str) -> str:
-    """Return a candidate ``effect@axis`` in words."""
-    effect, _, axis = label.partition("@")
-    return f"{phrase(effect)} on axis {axis}" if axis else phrase(effect)
+    """Return a candidate ``effect@axis`` or ``effect@5,6`` in words: "backlash on axis 2", "another link mass on axis 1"."""
+    effect, _, axes = label.partition("@")
+    what = f"another {noun(effect)}" if always_there(effect) else phrase(effect)
+    what = what.removeprefix("the machine's ")
+    first, _, second = axes.partition(",")
+    where = f" on axes {first} and {second}" if second else f" on axis {first}" if first else ""
+    return f"{what}{where}"
+
+
+def always_there(effect: str) -> bool:
+    """Whether every simulator has what an effect changes: a share of its own values, or a link of its arm."""
+    info = effect_info(effect)
+    of_a_link = info.acts == "arm" and info.family == "load"
+    share = info.parameters[0].name.startswith("relative_")
+    return info.scope == "axis" and (of_a_link or share)
 
 
 def with_joints(text: str, names: Sequence[str]) -> str:
@@ -56,11 +70,29 @@ def with_joints(text: str, names: Sequence[str]) -> str:
     return _MENTION.sub(mention, text)
 
 
-def verdict_word(verdict: str, before: float, refitted: float, floor: float) -> str:
-    """Return the verdict of an axis; ``at the floor`` where a cause acts on it and nothing was to be explained."""
-    noise = (1 + _NOISE) * floor
-    quiet = before <= noise and refitted <= noise
-    return "at the floor" if verdict == "explained" and quiet else verdict
+def at_floor(gap: float, floor: float) -> bool:
+    """Whether a gap [1] is no larger than its floor, up to the scatter of both; not where either is not finite."""
+    return gap <= (1 + _NOISE) * floor
+
+
+def verdict_word(verdict: str, row: Sequence[float]) -> str:
+    """Return the verdict of an axis in words, beside its ``row`` of the gap: before, re-fitted, after, floor [1].
+
+    That of an axis that is *explained*, because causes act on it, can be:
+
+    | word | where |
+    |---|---|
+    | ``at the floor`` | the re-fitted simulator has no gap there that the causes could explain |
+    | ``above the floor`` | a clear gap is left there, and the causes remove less than half of it (in squares) |
+    """
+    before, refitted, after, floor = row
+    if verdict != "explained":
+        return verdict
+    if at_floor(refitted, floor):
+        return "at the floor"
+    left, all_of_it = after**2 - floor**2, before**2 - floor**2
+    clear = after > _CLEAR * floor and left > _SEEN**2
+    return "above the floor" if clear and left > _HALF * all_of_it else verdict
 
 
 def removed_by_refit(

@@ -343,8 +343,7 @@ class Diagnosis:
     def axis_rows(self) -> list[tuple[int, str, tuple[float, ...]]]:
         """Return of each axis its number (from 1), verdict in words, and gap: before, re-fitted, after, floor [1].
 
-        The verdict is empty where the logs did not get that far, and ``at the floor`` where causes of
-        others act on an axis on which there was nothing to explain.
+        The verdict is empty where the logs did not get that far. `verdict_word` has the words.
         """
         gap, verdicts = self.gap, {a.axis: a.verdict for a in self.axes}
         stages = (
@@ -355,9 +354,7 @@ class Diagnosis:
         )
         out = []
         for i, row in enumerate(zip(*(x.tolist() for x in stages), strict=True), start=1):
-            before, refitted, _, floor = row
-            word = verdict_word(verdicts.get(i, ""), before, refitted, floor)
-            out.append((i, word, row))
+            out.append((i, verdict_word(verdicts.get(i, ""), row), row))
         return out
 
     def _repr_html_(self) -> str:

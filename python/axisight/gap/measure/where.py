@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -224,14 +224,24 @@ def _summary(error: Array, noise: Array, labels: list[str], dim: str) -> xr.Data
     )
 
 
+OF_GAP = "of the squared gap above the floor"
+"""What shares are of, in words."""
+
+
+def of_axes(bands: xr.Dataset, axes: Collection[int]) -> xr.Dataset:
+    """Return the map of the bands with the gap of some ``axes`` (from 1) alone; that of others counts for nothing."""
+    among = np.isin(bands["axis"].values, list(axes))
+    return bands.assign(square=bands["square"] * xr.DataArray(among.astype(float), dims="axis"))
+
+
 def findings(
-    bands: xr.Dataset, regimes: dict[str, xr.Dataset], significance: float
+    bands: xr.Dataset, regimes: dict[str, xr.Dataset], significance: float, of: str = OF_GAP
 ) -> tuple[Where, ...]:
     """Return the places that hold the gap, largest share first.
 
     An axis counts when its excess is significant; its band is the smallest run
     of significant bands that holds most of it, its regime the bin whose share
-    stands out most from an even spread of the error.
+    stands out most from an even spread of the error. ``of``: what shares are of, in words.
     """
     held = _held(bands, significance)
     total = held.sum()
@@ -239,7 +249,7 @@ def findings(
     for i in range(len(held)):
         share = float(held[i].sum() / total) if total > 0 else 0.0
         if share >= _SMALLEST_SHARE:
-            out.append(placed(bands, regimes, i, share, significance))
+            out.append(placed(bands, regimes, i, share, significance, of))
     return tuple(sorted(out, key=lambda w: -w.share))
 
 
@@ -253,11 +263,13 @@ def led_by_weight(
     regimes: dict[str, xr.Dataset],
     significance: float,
     excess: Array,
+    of: str = OF_GAP,
 ) -> tuple[Where, ...]:
     """Return places led by the axis whose weighted residual stands highest above noise, where it does by far.
 
-    ``excess`` (n_axes,): mean square of it above the floor, in noise. Plain errors of torque are told by slow
-    drifts, and hide what is small beside the torque but far above its noise.
+    ``excess`` (n_axes,): mean square of it above the floor, in noise. ``of``: what shares are of, in words.
+    Slow drifts dominate plain errors of torque. They hide an error that is small beside the torque but far
+    above its noise.
     """
     i = int(np.argmax(excess))
     axis = int(bands["axis"].values[i])
@@ -271,16 +283,19 @@ def led_by_weight(
     shares = held / max(held.sum(), 1e-300)
     others = [k for k in np.argsort(-shares) if k != i and shares[k] >= _SMALLEST_SHARE]
     leader, *rest = (
-        placed(bands, regimes, int(k), float(shares[k]), significance) for k in (i, *others)
+        placed(bands, regimes, int(k), float(shares[k]), significance, of) for k in (i, *others)
     )
-    told = (
-        f"; against noise the residual of this axis is the largest, {excess[i]:.3g} times the floor"
-    )
+    told = f"; largest residual of all axes against noise, {excess[i]:.3g} times the floor"
     return (replace(leader, evidence=leader.evidence + told), *rest)
 
 
 def placed(
-    bands: xr.Dataset, regimes: dict[str, xr.Dataset], i: int, share: float, significance: float
+    bands: xr.Dataset,
+    regimes: dict[str, xr.Dataset],
+    i: int,
+    share: float,
+    significance: float,
+    of: str = OF_GAP,
 ) -> Where:
     """Return the place on axis ``i`` (from 0) of an error that holds ``share`` of the whole.
 
@@ -290,7 +305,7 @@ def placed(
     axis = int(bands["axis"].values[i])
     regime, text = _main_regime(regimes, i, significance)
     held = _held(bands, significance)[i]
-    told = f"{100 * share:.0f} % of the squared gap above the floor"
+    told = f"{100 * share:.0f} % {of}"
     if not held.any():
         return Where(axis, share, None, regime, f"{told}, in no band steadily{text}")
     low, high = _main_band(held)

@@ -19,17 +19,25 @@ from axisight.gap.measure.chatter import chance_check
 from axisight.gap.measure.detection_limits import detection_limits
 from axisight.gap.measure.gap_figures import gap_figures, stage
 from axisight.gap.measure.motion_errors import motion_errors, velocity_from
-from axisight.gap.measure.where import band_map, findings, led_by_weight, regime_maps
+from axisight.gap.measure.where import (
+    band_map,
+    findings,
+    led_by_weight,
+    of_axes,
+    regime_maps,
+)
+from axisight.gap.ranking.twins import open_twins
 from axisight.gap.search.account import trace_of
 from axisight.gap.signals.encoder_steps import encoder_steps
 from axisight.gap.simulator.own_parameters import nominal_and_size, nominal_values
+from axisight.gap.verdict.axis_verdicts import open_groups, with_axes_agreed
 from axisight.gap.verdict.bent_simulator import bent_for
 from axisight.gap.verdict.carry_over import carried_over, open_check
 from axisight.gap.verdict.coarse_encoders import with_coarse_encoders
 from axisight.gap.verdict.conclusion import Conclusion
 from axisight.gap.verdict.controller_causes import with_controllers_shown
 from axisight.gap.verdict.gap_beyond_torque import beyond_torque
-from axisight.gap.verdict.headline import headline
+from axisight.gap.verdict.headline import Facts, headline
 from axisight.gap.verdict.remainder import refit_worse, remainder_of, reversals_smeared
 from axisight.gap.verdict.validated import Validated
 from axisight.gap.views.view import View
@@ -58,10 +66,15 @@ def assembled(
     gap = replace(gap, motion=_motion(view, held_logs, seen, noted))
     names = [log.name for log in held_logs]
     nominal, tolerances = nominal_values(robot), view.fitter.tolerances
-    left = remainder_of(reach.judged, gap_figures(reach.judged), reach.left, settings)
     conclusion, reductions = _concluded(view, held_logs, seen, settings)
-    causes = _causes(conclusion, reductions)
+    conclusion = with_axes_agreed(
+        conclusion, reach.judged, gap, settings, own_residual=found.adds_up
+    )
+    quiet = [a.axis for a in conclusion.axes if a.verdict == "none"]
+    left = remainder_of(reach.judged, gap_figures(reach.judged), reach.left, settings, quiet)
     places = _places(conclusion, (bands, regimes, settings.significance), settings)
+    conclusion = conclusion.ranked_on(places[0].axis) if places else conclusion
+    causes = _causes(conclusion, reductions)
     # Where nothing was named, `after` is the simulator re-fitted alone.
     fitted = found.model if reach.reductions else found.baseline
     refit = {k: _relative(robot, fitted, k) for k in fitted.robot_values}
@@ -70,7 +83,20 @@ def assembled(
         mode=view.mode,
         verdict=conclusion.verdict,
         headline=headline(
-            conclusion, gap, causes, places, robot.effects, refit=refit, joints=robot.axis_names
+            Facts(
+                verdict=conclusion.verdict,
+                gap=gap,
+                axes=conclusion.axes,
+                causes=causes,
+                open=open_groups(conclusion, robot.n_axes),
+                twins=open_twins(conclusion.causes, robot.n_axes),
+                withdrawn=conclusion.withdrawn,
+                where=places,
+                remainder=left,
+                own=tuple(robot.effects),
+                refit=refit,
+                joints=robot.axis_names,
+            )
         ),
         gap=gap,
         where=places,
@@ -149,11 +175,22 @@ def _places(
     maps: tuple[xr.Dataset, dict[str, xr.Dataset], float],
     settings: Settings,
 ) -> tuple[Where, ...]:
-    """Return where the gap lies; nowhere where there is none."""
-    places = findings(*maps) if conclusion.verdict != "none" else ()
-    excess = np.array([axis.excess for axis in conclusion.axes])
-    if conclusion.verdict == "unknown" and excess.max() > settings.largest_scatter:
-        places = led_by_weight(places, *maps, excess)
+    """Return where the gap lies: the gap before the causes, or what no effect explains of it; nowhere of *none*.
+
+    Of axes with that gap alone; one of them at least.
+    """
+    if conclusion.verdict == "none":
+        return ()
+    bands, regimes, significance = maps
+    unknown = conclusion.verdict == "unknown"
+    told = [a for a in conclusion.axes if a.verdict == "unknown" or not (unknown or a.verdict == "none")]
+    axes = [a.axis for a in told]
+    seen = of_axes(bands, axes)
+    of = f"of the squared gap {'that no effect explains' if unknown else 'before the causes'}"
+    places = findings(seen, regimes, significance, of)
+    excess = np.array([a.excess if a.axis in axes else -np.inf for a in conclusion.axes])
+    if unknown and (not places or excess.max() > settings.largest_scatter):
+        places = led_by_weight(places, seen, regimes, significance, excess, of)
     return places
 
 

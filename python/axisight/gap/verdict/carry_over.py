@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.facts.axis_names import placed
 from axisight.gap.facts.compared_quantity import torque_of
 from axisight.gap.facts.result import Gap
 from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.withdrawal import Contradiction, Withdrawal
 from axisight.gap.facts.wording import listed, percent
 from axisight.gap.fit.tolerance_edges import BENT
 from axisight.gap.measure.by_axis import OwnAxes
@@ -49,42 +49,50 @@ def carried_over(
 ) -> Conclusion:
     """Return the conclusion, or *unknown* with the reason where the validation logs contradict it.
 
-    A cause whose addition does not shrink the validation gap is withdrawn; where nothing stands above the
-    floor there, and hardly anything on the estimation logs, it is none. *None* is withdrawn where a
-    log stands above the floor; and nothing is said where the noise estimated from the logs is
-    larger than a gap that is seen. ``own``: of causes whose axes are judged alone; they have to shrink the gap there.
+    | estimation logs say | validation logs contradict where | verdict then |
+    |---|---|---|
+    | causes | they do not shrink the gap there | *unknown* |
+    | causes of the size of noise | they do not shrink it, and no log stands above the floor | *none* |
+    | *none* | a log stands above the floor | *unknown* |
+    | anything | the estimated noise is larger than a gap that is seen | *unknown* |
+
+    ``own``: of causes whose axes are judged alone; they have to shrink the gap there.
     ``bent``: share of the simulator's own parameters that the re-fit beside the causes took to the edge
     of their tolerance, where that counts. ``removed``: share of what weighted residuals of the validation
     logs have above noise that the causes remove; None where it is not known. ``stepped`` (n_axes,): where the
     noise is that of an encoder's steps, of no axis by default.
     """
     withdrawn = None
+    labels = tuple(cause.label for cause in conclusion.causes)
     if gap.refitted > _SEEN and gap.floor > _ABSURD * gap.refitted:
-        withdrawn = (
-            f"No verdict: the noise estimated from the logs ({percent(gap.floor)} of the {torque_of(gap.compared)}) is "
-            f"larger than the gap ({percent(gap.refitted)}): look for faults in the data, such as "
-            f"glitches, frozen or missing samples, with `axisight check`."
-        )
+        withdrawn = Withdrawal("noise", gap.before, gap.refitted, gap.floor)
     elif own is not None:
         # Another motion may leave more of what nothing explains, and ask as much of the causes.
-        withdrawn = _no_fall_there(own, stages, names)
+        withdrawn = _no_fall_there(own, stages, names, conclusion)
     elif conclusion.causes and removed is not None and _of_no_size(conclusion, stages, removed):
         return _nothing(conclusion)
     elif conclusion.causes:
-        labels = [cause.label for cause in conclusion.causes]
-        withdrawn = _no_fall(stages, gap, names, settings, stepped, labels) or _out_of_shape(bent)
+        withdrawn = _no_fall(stages, gap, names, settings, stepped, labels)
+        if withdrawn is None and bent >= BENT:
+            withdrawn = Withdrawal("bent", gap.before, gap.after, gap.floor, None, None, labels, bent)
     elif conclusion.verdict == "none":
         withdrawn = _above_floor(stages, names)
     if withdrawn is None:
         return conclusion
     return replace(
         conclusion.without_causes("unknown"),
-        next_experiment=(
-            "Look at the log and axis named: what was different there (load, pose, speed, torque "
-            "range)? Record more of it for estimation."
-        ),
+        next_experiment=_ADVICE["noise" if withdrawn.why == "noise" else "log"],
         withdrawn=withdrawn,
     )
+
+
+_ADVICE = {
+    "noise": "Run `axisight check` on the logs. Look for glitches and for frozen or missing samples.",
+    "log": (
+        "Compare the named log and axis with the estimation logs: load, pose, speed, torque range. "
+        "Record more runs like it for estimation."
+    ),
+}
 
 
 def _of_no_size(conclusion: Conclusion, stages: Stages, removed: float) -> bool:
@@ -98,16 +106,14 @@ def _of_no_size(conclusion: Conclusion, stages: Stages, removed: float) -> bool:
 
 def _nothing(conclusion: Conclusion) -> Conclusion:
     """Return *none* in the place of causes of no size; a check says which they were."""
-    names = ", ".join(
-        c.effect if c.axis is None else f"{c.effect}@{c.axis}" for c in conclusion.causes
-    )
+    names = listed([c.label for c in conclusion.causes])
     return replace(
         conclusion.without_causes("none"),
         next_experiment=None,
         checks=(
             *conclusion.checks,
-            f"{names} explains a little of the estimation logs, where the simulator leaves next to what noise "
-            "does, and nothing of the validation logs: no cause.",
+            f"Not a cause: {names}. It explains a gap of about the size of noise on the estimation logs, and "
+            "nothing on the validation logs.",
         ),
     )
 
@@ -128,8 +134,9 @@ def open_check(stages: Stages) -> tuple[str, ...]:
         return ()
     share = percent(float(np.sqrt(stages.open.mean())))
     return (
-        f"Where motors stand or turn round, dry friction holds any torque in its band: up to {share} "
-        f"of the {torque_of(stages.compared)} is left open there, counts as gap, and speaks for or against nothing.",
+        f"Dry friction can hold any torque within its band while a motor stands or reverses. Up to {share} of "
+        f"the {torque_of(stages.compared)} cannot be known there. It counts as gap, but neither for nor against "
+        "a cause.",
     )
 
 
@@ -150,16 +157,12 @@ def _no_fall(
     names: Sequence[str],
     settings: Settings,
     stepped: NDArray[np.bool_] | None,
-    causes: Sequence[str],
-) -> str | None:
-    """Say so where the causes, by label, remove too little of the gap."""
+    causes: tuple[str, ...],
+) -> Withdrawal | None:
+    """Return the contradiction where the causes, by label, remove too little of the gap."""
     floor = _floor(stages, stepped)
     if gap.after**2 - gap.refitted**2 > settings.smallest_gain * gap.floor**2:
-        return (
-            f"What explains the estimation logs does not carry over to the validation logs: there the "
-            f"simulator re-fitted within its tolerances leaves {percent(gap.refitted)} "
-            f"of the {torque_of(gap.compared)}, with it {percent(gap.after)}."
-        )
+        return Withdrawal("refit", gap.refitted, gap.after, gap.floor, causes=causes)
     # Where little stands above the noise, what is left of it is the noise of the floor.
     if gap.after**2 - floor <= settings.smallest_gain * floor:
         return None
@@ -168,57 +171,44 @@ def _no_fall(
     if share >= _ENOUGH:
         return None
     if share >= 0.5 * settings.explained_share:
-        return (
-            f"What explains part of the gap ({listed([placed(c) for c in causes])}) leaves too much of it: on the "
-            f"validation logs it goes from "
-            f"{percent(gap.before)} to {percent(gap.after)} of the {torque_of(gap.compared)}, "
-            f"{percent(gap.floor)} would be noise. Something else is missing."
-        )
+        return Withdrawal("part", gap.before, gap.after, gap.floor, causes=causes)
     before, after = _squares(stages.given), _squares(stages.after)
     log, axis = divmod(int(np.argmax(after - before)), after.shape[1])
-    return (
-        f"What explains the estimation logs does not carry over to the validation logs: with it the "
-        f"gap goes from {percent(gap.before)} to {percent(gap.after)} of the {torque_of(gap.compared)}; "
-        f"on axis {axis + 1} of {names[log]} from {percent(float(np.sqrt(before[log, axis])))} to "
-        f"{percent(float(np.sqrt(after[log, axis])))}."
-    )
+    return _on("fall", stages, (log, axis), before, after, names, causes)
 
 
-def _out_of_shape(bent: float) -> str | None:
-    """Say so where the simulator's own parameters make up for what the causes do not explain."""
-    if bent < BENT:
-        return None
-    return (
-        f"The causes found explain the gap only with {100 * bent:.0f} % of the simulator's own parameters at "
-        f"the edge of their tolerance: something else is missing."
-    )
-
-
-def _no_fall_there(own: OwnAxes, stages: Stages, names: Sequence[str]) -> str | None:
-    """Say so where the causes of an axis do not shrink its gap."""
+def _no_fall_there(
+    own: OwnAxes, stages: Stages, names: Sequence[str], conclusion: Conclusion
+) -> Withdrawal | None:
+    """Return the contradiction where the causes of an axis do not shrink its gap."""
     axis = own.not_carried()
     if axis is None:
         return None
-    given, left = (_squares(s)[:, axis] for s in (stages.given, stages.after))
-    log = int(np.argmax(left - given))
-    before, after = (percent(float(np.sqrt(x[log]))) for x in (given, left))
-    return (
-        f"What explains axis {axis + 1} on the estimation logs does not carry over to the validation "
-        f"logs: with it the gap of the axis goes from {before} to {after} of the "
-        f"{torque_of(stages.compared)} on {names[log]}."
-    )
+    given, left = _squares(stages.given), _squares(stages.after)
+    log = int(np.argmax((left - given)[:, axis]))
+    mine = tuple(c.label for c in conclusion.causes if axis + 1 in (c.axis, *(c.axes or ())))
+    return _on("axis", stages, (log, axis), given, left, names, mine)
 
 
-def _above_floor(stages: Stages, names: Sequence[str]) -> str | None:
-    """Say where the re-fitted simulator leaves more than noise."""
-    left, noise = _squares(stages.refitted), _squares(stages.floor)
+def _above_floor(stages: Stages, names: Sequence[str]) -> Withdrawal | None:
+    """Return the contradiction where the re-fitted simulator leaves more than noise."""
+    left = _squares(stages.refitted)
     excess = above_floor(stages.refitted, stages)
     if not np.any(excess > 0):
         return None
     log, axis = divmod(int(np.argmax(excess)), excess.shape[1])
-    return (
-        f"No effect is missing on the estimation logs, but that does not carry over to the validation "
-        f"logs: on axis {axis + 1} of {names[log]} the simulator leaves "
-        f"{percent(float(np.sqrt(left[log, axis])))} of the {torque_of(stages.compared)} unexplained; sensor noise "
-        f"alone leaves {percent(float(np.sqrt(noise[log, axis])))}."
-    )
+    return _on("none", stages, (log, axis), left, left, names)
+
+
+def _on(
+    why: Contradiction,
+    stages: Stages,
+    place: tuple[int, int],
+    before: Array,
+    after: Array,
+    names: Sequence[str],
+    causes: tuple[str, ...] = (),
+) -> Withdrawal:
+    """Return the contradiction with the figures of one log and axis (from 0), of squares (n_logs, n_axes)."""
+    figures = (float(np.sqrt(x[place])) for x in (before, after, _squares(stages.floor)))
+    return Withdrawal(why, *figures, axis=place[1] + 1, log=names[place[0]], causes=causes)

@@ -15,6 +15,7 @@ from axisight.gap.facts.named_cause import NamedCause
 from axisight.gap.facts.result import AxisVerdict, Candidate, Interval, VerdictKind
 from axisight.gap.facts.settings import Settings
 from axisight.gap.facts.trace import Adjustment, log_odds
+from axisight.gap.facts.withdrawal import Withdrawal
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.ranking.intervals import intervals
@@ -29,6 +30,16 @@ from axisight.gap.search.state import SearchState
 from axisight.gap.verdict.separating_advice import separating_experiment
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class AxisStanding:
+    """How candidates stood on one axis (from 1) before any cause was taken in, the most probable first."""
+
+    axis: int
+    ranking: tuple[Candidate, ...]
+    p_none: float
+    p_unknown: float
 
 
 @dataclass(frozen=True)
@@ -47,8 +58,10 @@ class Conclusion:
     checks: tuple[str, ...]
     effects: tuple[Effect, ...] = ()
     """The causes as they are added to the simulator."""
-    withdrawn: str | None = None
-    """Why the validation logs contradict what the estimation logs say."""
+    withdrawn: Withdrawal | None = None
+    """How the validation logs contradict what the estimation logs say, if they do."""
+    standings: tuple[AxisStanding, ...] = ()
+    """How candidates stood on each axis in the first round of the search."""
 
     def with_checks(self, more: Sequence[str]) -> Conclusion:
         """Return the same with further checks."""
@@ -82,6 +95,23 @@ class Conclusion:
             equivalent=(),
             alternatives=self.ranking[:_ALTERNATIVES],
             axes=tuple(replace(a, causes=(), verdict=verdict) for a in self.axes),
+        )
+
+    def ranked_on(self, axis: int) -> Conclusion:
+        """Return the same with the candidates of an axis (from 1): of *unknown*, where most is left to explain.
+
+        Unchanged where the verdict is another, or no candidate improves that axis.
+        """
+        standing = next((s for s in self.standings if s.axis == axis), None)
+        if self.verdict != "unknown" or standing is None:
+            return self
+        named = {c.label for c in self.causes}
+        return replace(
+            self,
+            ranking=standing.ranking,
+            alternatives=tuple(c for c in standing.ranking if c.label not in named)[:_ALTERNATIVES],
+            p_none=standing.p_none,
+            p_unknown=standing.p_unknown,
         )
 
     def rivals_of(self, label: str) -> tuple[str, ...]:
@@ -126,7 +156,7 @@ def conclude(
     ranking = with_twins(ranking, n_axes)
     groups = [_open(r, s, labels) for r, s in accepted]
     open_groups = tuple(g for g in groups if len(g) > 1)
-    beyond_colour = _most(found, found.baseline.loss) > _OF_COLOUR
+    beyond_colour = _most(found, found.baseline.loss) > OF_COLOUR
     gap = (stands_out or beyond_colour) and _significant(found, settings)
     if not accepted and not shown:
         verdict: VerdictKind = "unknown" if gap else "none"
@@ -166,7 +196,13 @@ def conclude(
             *_checks(found, settings, explained),
         ),
         effects=effects,
+        standings=tuple(_standing(s, n_axes) for s in found.rounds[0].standings),
     )
+
+
+def _standing(posterior: AxisPosterior, n_axes: int) -> AxisStanding:
+    ranking = with_twins(tuple(map(_candidate, posterior.ranked)), n_axes)
+    return AxisStanding(posterior.axis + 1, ranking, posterior.p_none, posterior.p_unknown)
 
 
 # What the right law leaves of what it explains, whoever writes its formula, and mean square above the
@@ -254,7 +290,7 @@ def _axes(
 # draws that were called none it was, held out, 0.4 at most where nothing lacked, and 1.5 to 2 on three that
 # lacked something. In the fit, not held out: of a log that alone tells a parameter the others predict what the
 # simulator does, and that is no effect.
-_OF_COLOUR = 1.0
+OF_COLOUR = 1.0
 
 
 def _significant(found: SearchState, settings: Settings) -> bool:
@@ -324,9 +360,11 @@ def _checks(found: SearchState, settings: Settings, explained: float) -> tuple[s
     before = held_out_loss(found.baseline, like=found.model)
     size = float(found.baseline.samples.sum())
     left = float((held_out_loss(found.model) - found.floor).sum()) / size
+    rounds = len(found.rounds)
     out = [
-        f"{tried} fits of candidate effects compared over {len(found.rounds)} rounds on data left out of each fit.",
-        f"Mean square of the weighted residual above the floor: {(before - found.floor).sum() / size:.3f} "
+        f"{tried} fits of candidate effects compared in {rounds} round{'s' if rounds > 1 else ''}, on data left "
+        "out of each fit.",
+        f"Mean square of the residual above the floor: {(before - found.floor).sum() / size:.3f} "
         f"re-fitted, {left:.3f} with the causes (1 is noise plus {100 * settings.model_error:g} % model error).",
         f"Share of the explainable error removed on held-out estimation data: {100 * explained:.1f} %.",
     ]
@@ -336,6 +374,6 @@ def _checks(found: SearchState, settings: Settings, explained: float) -> tuple[s
 
 def _advice_unknown() -> str:
     return (
-        "Look at the gap map for the axis, band and regime of the residual; record a run that "
-        "repeats the same motion twice, to tell a repeatable effect from a disturbance in time."
+        "Look at the gap map: in which band and regime of that axis does the gap lie? Then record the same "
+        "motion twice. What repeats is an effect of the machine, what does not is a disturbance."
     )

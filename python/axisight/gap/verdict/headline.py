@@ -1,69 +1,83 @@
-"""The finding in words."""
+"""The verdict in words: first what is sure, then what is open, then where the rest of the gap lies.
+
+`headline` makes the words from `Facts` alone, so that the same facts give the same text.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from dataclasses import dataclass, field
 
-from axisight.effects import Effect, article, effect_info, noun
-from axisight.gap.facts.axis_names import placed, removed_by_refit, with_joints
+from axisight.effects import Effect, effect_info
+from axisight.gap.facts.axis_names import at_floor, placed, removed_by_refit, with_joints
 from axisight.gap.facts.compared_quantity import gap_of, torque_of
-from axisight.gap.facts.result import Cause, Gap, Interval, Where
+from axisight.gap.facts.result import (
+    AxisVerdict,
+    Cause,
+    Gap,
+    Interval,
+    Remainder,
+    VerdictKind,
+    Where,
+)
+from axisight.gap.facts.withdrawal import Withdrawal
 from axisight.gap.facts.wording import listed, percent
-from axisight.gap.verdict.conclusion import Conclusion
+from axisight.gap.verdict.cause_words import axes_of, deed, in_order, named, place, sure
+
+__all__ = ["Facts", "clear_changes", "headline", "in_order", "named", "within_tolerances"]
+
+_Groups = tuple[tuple[str, ...], ...]
+
+# Share of the torque from which noise hides most of what could be missing on an axis.
+_LOUD = 0.5
+# Rivals of a group, groups, and axes that a sentence names.
+_RIVALS, _GROUPS, _AXES = 3, 2, 3
+# Changes of the re-fit that are told by name.
+_TOLD = 4
 
 
-def headline(
-    conclusion: Conclusion,
-    gap: Gap,
-    causes: Sequence[Cause],
-    where: Sequence[Where],
-    own: Sequence[Effect] = (),
-    *,
-    refit: Mapping[str, Interval] = MappingProxyType({}),
-    joints: Sequence[str] = (),
-) -> str:
-    """Return the finding in one or two plain sentences.
+@dataclass(frozen=True)
+class Facts:
+    """What the words are made of.
 
-    ``own``: effects of the simulator; ``refit``: what its own parameters changed by; ``joints``: names of
-    its axes.
+    ``verdict`` of the arm, ``axes`` of each axis; ``gap`` on the validation logs; ``causes`` as they are named.
+    ``open``: groups of labels that the data cannot tell apart, the cause first; ``twins``: groups that give
+    the same logs; ``withdrawn``: how the validation logs contradict the estimation logs. ``where`` the gap
+    lies and the ``remainder`` with the causes in. ``own``: effects of the simulator; ``refit``: relative change
+    of its own parameters [1]; ``joints``: names of its axes.
     """
-    return with_joints(_said(conclusion, gap, causes, where, own, refit), joints)
+
+    verdict: VerdictKind
+    gap: Gap
+    axes: tuple[AxisVerdict, ...] = ()
+    causes: tuple[Cause, ...] = ()
+    open: _Groups = ()
+    twins: _Groups = ()
+    withdrawn: Withdrawal | None = None
+    where: tuple[Where, ...] = ()
+    remainder: Remainder | None = None
+    own: tuple[Effect, ...] = ()
+    refit: Mapping[str, Interval] = field(default_factory=dict)
+    joints: Sequence[str] = ()
+
+    @property
+    def n_axes(self) -> int:
+        """Number of axes."""
+        return len(self.gap.before_per_axis)
 
 
-def _said(
-    conclusion: Conclusion,
-    gap: Gap,
-    causes: Sequence[Cause],
-    where: Sequence[Where],
-    own: Sequence[Effect],
-    refit: Mapping[str, Interval],
-) -> str:
-    place = f" The gap lies mainly on axis {where[0].axis}." if where else ""
-    if conclusion.withdrawn is not None:
-        return f"{conclusion.withdrawn}{place}"
-    of = f"of the {torque_of(gap.compared)}"
-    moved = within_tolerances(gap)
-    if conclusion.verdict == "none" and moved:
-        return _refitted(gap, moved, refit)
-    if conclusion.verdict == "none":
-        return (
-            f"No unmodelled effect found: the simulator, re-fitted within its tolerances, leaves "
-            f"{percent(gap.refitted)} {of} unexplained; sensor noise alone leaves {percent(gap.floor)}."
-        )
-    if conclusion.verdict == "unknown" and causes:
-        missing = named(causes, own, len(gap.before_per_axis))
-        return (
-            f"The simulator lacks {missing}, and something else that no known effect explains well: "
-            f"the {gap_of(gap.compared)} on held-out data goes from {percent(gap.before)} to "
-            f"{percent(gap.after)} {of}, {percent(gap.floor)} would be noise.{place}"
-        )
-    if conclusion.verdict == "unknown":
-        return (
-            f"The simulator misses something that no known effect explains well: "
-            f"{percent(gap.before)} {of} is unexplained, {percent(gap.floor)} would be noise.{place}"
-        )
-    return _of_causes(conclusion, gap, causes, own)
+def headline(facts: Facts) -> str:
+    """Return the verdict in a few plain sentences, axes with the names of their joints."""
+    if facts.withdrawn is not None and facts.withdrawn.why == "noise":
+        said = _no_verdict(facts)
+    elif facts.verdict == "none":
+        said = _none(facts)
+    elif facts.verdict == "unknown":
+        said = _unknown(facts)
+    else:
+        said = _explained(facts)
+    return with_joints(" ".join(x for x in said if x), facts.joints)
 
 
 def within_tolerances(gap: Gap) -> list[int]:
@@ -72,107 +86,237 @@ def within_tolerances(gap: Gap) -> list[int]:
     return removed_by_refit(*(stage.tolist() for stage in stages))
 
 
-def _refitted(gap: Gap, axes: Sequence[int], refit: Mapping[str, Interval]) -> str:
-    """Return the finding where nothing but the simulator's own parameters makes the gap as given."""
-    first, *others = axes
-    stages = (gap.before_per_axis, gap.refitted_per_axis, gap.floor_per_axis)
-    before, left, floor = (percent(float(stage[first - 1])) for stage in stages)
-    also = f", and above the floor {_place(others, 0)} too," if others else ""
-    changes = clear_changes(refit)
-    how = f" ({', '.join(changes)})" if changes else ""
-    return (
-        f"No unmodelled effect found: the gap as given, {before} of the {torque_of(gap.compared)} on axis "
-        f"{first}{also} is within the tolerances of the simulator's own parameters. Re-fitted{how}, they "
-        f"leave {left} there; sensor noise alone leaves {floor}."
-    )
-
-
-def _of_causes(
-    conclusion: Conclusion, gap: Gap, causes: Sequence[Cause], own: Sequence[Effect]
-) -> str:
-    missing = named(causes, own, len(gap.before_per_axis))
-    # What logs show by themselves, and torques predicted from the motion do not feel.
-    felt = [c for c in causes if not c.gap_reduction.low == c.gap_reduction.high == 0.0]
-    steps = [c for c in felt if effect_info(c.effect).unrepeatable]
-    if causes and not felt:
-        return (
-            f"The simulator lacks {missing}, which a torque predicted from the measured motion does not feel: "
-            f"re-fitted, it leaves {percent(gap.refitted)} of the {torque_of(gap.compared)}, sensor noise "
-            f"alone {percent(gap.floor)}."
-        )
-    if causes and len(steps) == len(causes):
-        return (
-            f"The simulator lacks {missing}: the steps of the encoders are the noise at which the "
-            f"{gap_of(gap.compared)} of {percent(gap.refitted)} of the {torque_of(gap.compared)} stands "
-            f"(noise and steps: {percent(gap.floor)})."
-        )
-    others = [c for c in felt if c not in steps]
-    added = "it" if len(others) == 1 else "them"
-    if len(others) < len(causes):
-        added = named(others, own, len(gap.before_per_axis))
-    shrinks = (
-        f"adding {added} shrinks the {gap_of(gap.compared)} on held-out data from {percent(gap.before)} to "
-        f"{percent(gap.after)} of the {torque_of(gap.compared)} "
-        f"(noise{' and steps' if steps else ''} alone: {percent(gap.floor)})."
-    )
-    if conclusion.verdict == "undecidable":
-        rivals = listed([placed(label) for label in conclusion.equivalent[0]])
-        return f"This data cannot tell {rivals} apart: with the first of them, {shrinks}"
-    return f"The simulator lacks {missing}: {shrinks}"
-
-
-def in_order(causes: Sequence[Cause]) -> list[Cause]:
-    """Return causes by effect, in the order in which effects first come, then by axis."""
-    first = {c.effect: i for i, c in reversed(list(enumerate(causes)))}
-    return sorted(causes, key=lambda c: (first[c.effect], c.axis or 0))
-
-
-def named(causes: Sequence[Cause], own: Sequence[Effect] = (), n_axes: int = 0) -> str:
-    """Return causes in words, one phrase an effect: "Coulomb friction on axes 1, 2 and 5".
-
-    ``own``: effects that the simulator has already; ``n_axes``: of the robot. Effects that differ
-    by an adjective and have the same axes share a phrase: "Coulomb and viscous friction".
-    """
-    present = {(e.name, e.axis) for e in own if e.acts}
-    axes: dict[str, list[int]] = {}
-    for c in in_order(causes):
-        axes.setdefault(c.effect, []).extend(c.axes or ([] if c.axis is None else [c.axis]))
-    phrases: dict[tuple[str, str, tuple[int, ...]], list[str]] = {}
-    for effect, mine in axes.items():
-        known = any((c.effect, c.axis) in present for c in causes if c.effect == effect)
-        start = "the machine's values of" if known else article(effect)
-        adjective, _, head = noun(effect).rpartition(" ")
-        # Two delays are two things; friction of two kinds is one.
-        shared = head if start not in ("a", "an") else noun(effect)
-        key = (start, shared, tuple(mine))
-        phrases.setdefault(key, []).append(adjective if shared == head else "")
-    return listed(
-        [
-            " ".join(x for x in (start, listed(adjectives), head, _place(where, n_axes)) if x)
-            for (start, head, where), adjectives in phrases.items()
-        ]
-    )
-
-
-def _place(axes: Sequence[int], n_axes: int) -> str:
-    if not axes:
-        return ""
-    if 1 < len(axes) == n_axes:
-        return "on both axes" if n_axes == 2 else f"on all {_COUNTS.get(n_axes, n_axes)} axes"
-    return f"on {'axis' if len(axes) == 1 else 'axes'} {listed([str(a) for a in axes])}"
-
-
-# Numbers of axes in words.
-_COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
-
-
-# Changes that are told by name, of what may be many.
-_TOLD = 4
-
-
 def clear_changes(refit: Mapping[str, Interval]) -> list[str]:
-    """Return re-fitted parameters with what they changed by, the largest first: those whose interval leaves out 0."""
+    """Return re-fitted parameters with their change, the largest first, where its 95 % interval leaves out zero."""
     clear = {k: p for k, p in refit.items() if p.low > 0 or p.high < 0}
     largest = sorted(clear.items(), key=lambda item: -abs(item[1].value))
     told = [f"{k} {100 * p.value:+.2g} %" for k, p in largest[:_TOLD]]
     return told if len(largest) <= _TOLD else [*told, f"and {len(largest) - _TOLD} more"]
+
+
+def _no_verdict(facts: Facts) -> list[str]:
+    """Of noise that is larger than the gap: a fault of the data."""
+    gap = facts.gap
+    return [
+        f"No verdict: the noise estimated from the logs, {percent(gap.floor)} of the {_torque(facts)}, is larger "
+        f"than the gap of {percent(gap.refitted)}.",
+        "Look for glitches and for frozen or missing samples with `axisight check`.",
+    ]
+
+
+def _none(facts: Facts) -> list[str]:
+    gap = facts.gap
+    moved = within_tolerances(gap)
+    out = ["No unmodelled effect found."]
+    if moved:
+        first, *others = moved
+        before, left, noise = (
+            percent(float(x[first - 1]))
+            for x in (gap.before_per_axis, gap.refitted_per_axis, gap.floor_per_axis)
+        )
+        also = f", like that of {place(others, 0)}," if others else ""
+        changes = clear_changes(facts.refit)
+        how = f" ({', '.join(changes)})" if changes else ""
+        out += [
+            f"The gap of {before} of the {_torque(facts)} on axis {first}{also} lies within the tolerances of the "
+            "simulator's own parameters.",
+            f"Re-fitted{how}, they leave {left} there (noise alone: {noise}).",
+        ]
+    else:
+        out.append(
+            f"The re-fitted simulator leaves {percent(gap.refitted)} of the {_torque(facts)} on validation logs "
+            f"(noise alone: {percent(gap.floor)})."
+        )
+    loud = [i for i, x in enumerate(gap.floor_per_axis.tolist(), start=1) if x >= _LOUD]
+    if loud:
+        most = percent(float(max(gap.floor_per_axis)))
+        out.append(
+            f"Noise hides much on {place(loud, facts.n_axes)}: it is {most} of the {_torque(facts)} there."
+            if len(loud) == 1
+            else f"Noise hides much on {place(loud, facts.n_axes)}: it is up to {most} of the {_torque(facts)} there."
+        )
+    return out
+
+
+def _explained(facts: Facts) -> list[str]:
+    """Of causes: those that are sure, those that stay open, what they do to the gap, what is left."""
+    still_open = {label for group in facts.open for label in group}
+    certain = [c for c in facts.causes if c.label not in still_open]
+    out = [sure(certain, facts.own, facts.n_axes)] if certain else []
+    return [*out, _open(facts), _effect(facts), _twins(facts), _rest(facts)]
+
+
+def _open(facts: Facts) -> str:
+    if not facts.open:
+        return ""
+    pairs = []
+    for group in facts.open[:_GROUPS]:
+        rivals = [placed(label) for label in group[:_RIVALS]]
+        if len(group) > _RIVALS:
+            rivals.append(f"{len(group) - _RIVALS} others")
+        pairs.append(listed(rivals, "or"))
+    more = len(facts.open) - _GROUPS
+    pairs += [f"{more} more such choice{'s' if more > 1 else ''}"] if more > 0 else []
+    return f"Open: {'; '.join(pairs)}. These logs cannot tell them apart."
+
+
+def _effect(facts: Facts) -> str:
+    """Return what the causes do to the gap; logs show some by themselves, and the gap does not feel them."""
+    gap, causes = facts.gap, facts.causes
+    figures = f"of the {_torque(facts)}"
+    what = gap_of(gap.compared)
+    felt = [c for c in causes if not c.gap_reduction.low == c.gap_reduction.high == 0.0]
+    steps = [c for c in felt if effect_info(c.effect).unrepeatable]
+    if not felt:
+        return (
+            "A torque predicted from the measured motion does not feel this. The gap is "
+            f"{percent(gap.refitted)} {figures} (noise alone: {percent(gap.floor)})."
+        )
+    if len(steps) == len(causes):
+        return (
+            f"The steps of the encoders set the floor: the {what} is {percent(gap.refitted)} {figures} "
+            f"(noise and steps: {percent(gap.floor)})."
+        )
+    noise = f"(noise{' and steps' if steps else ''} alone: {percent(gap.floor)})"
+    from_to = f"from {percent(gap.before)} to {percent(gap.after)} {figures} {noise}"
+    cuts = "cuts" if not gap.after >= gap.before else "takes"
+    if facts.open:
+        one = f"the first of {'each' if len(facts.open) > 1 else 'them'}"
+        return f"With {one} the {what} on validation logs goes {from_to}."
+    others = [c for c in felt if c not in steps]
+    act = deed(others, facts.own, causes, facts.n_axes)
+    return f"{act} {cuts} the {what} on validation logs {from_to}."
+
+
+def _twins(facts: Facts) -> str:
+    """Return which other effect would give the same logs, where that is one; the checks have more."""
+    if len(facts.twins) != 1 or facts.open:
+        return ""
+    cause, *others = facts.twins[0]
+    return f"{_capital(listed([placed(x) for x in others], 'or'))} would give the same logs as {placed(cause)}."
+
+
+def _rest(facts: Facts) -> str:
+    left = facts.remainder
+    if left is None or not left.where:
+        return ""
+    axis = left.where[0].axis
+    value = percent(float(left.per_axis[axis - 1]))
+    return f"Axis {axis} keeps {value} of its {_torque(facts)} above noise{_regime(left.where[0])}."
+
+
+def _unknown(facts: Facts) -> list[str]:
+    out = []
+    if facts.causes:
+        out = [sure(facts.causes, facts.own, facts.n_axes), _effect_in_part(facts)]
+    return [*out, _gap_left(facts), _contradiction(facts)]
+
+
+def _gap_left(facts: Facts) -> str:
+    """Return which axis has a gap that nothing explains, the largest first."""
+    gap = facts.gap
+    left = gap.after_per_axis if facts.causes else gap.refitted_per_axis
+    axes = _unknown_axes(facts, left.tolist())
+    if not axes:
+        return (
+            f"No known effect explains the {gap_of(gap.compared)} of {percent(gap.before)} of the "
+            f"{_torque(facts)} (noise alone: {percent(gap.floor)})."
+        )
+    first, *others = axes
+    value, floor = float(left[first - 1]), float(gap.floor_per_axis[first - 1])
+    figures = f"{percent(value)} of the {_torque(facts)} (noise alone: {percent(floor)})"
+    where = next((_regime(w) for w in facts.where if w.axis == first), "")
+    if at_floor(value, floor):
+        return (
+            f"Axis {first} has an error on the estimation logs that no known effect explains{where}. "
+            f"On validation logs it does not stand out: {figures}."
+        )
+    if not math.isfinite(value):
+        return f"Axis {first} has a gap that no known effect explains: the simulation broke off there."
+    text = f"Axis {first} has a {gap_of(gap.compared)} that no known effect explains: {figures}{where}."
+    too = f"{_capital(place(sorted(others), 0))} {'have' if len(others) > 1 else 'has'} one too."
+    return f"{text} {too}" if others else text
+
+
+def _unknown_axes(facts: Facts, left: Sequence[float]) -> list[int]:
+    """Return the axes that are unknown: that of the first place first, then by how far they stand above the floor."""
+    floor = facts.gap.floor_per_axis.tolist()
+    leads = facts.where[0].axis if facts.where else 0
+
+    def order(axis: int) -> tuple[bool, float]:
+        above = left[axis - 1] ** 2 - floor[axis - 1] ** 2
+        return axis != leads, -above if math.isfinite(above) else -math.inf
+
+    return sorted((a.axis for a in facts.axes if a.verdict == "unknown"), key=order)
+
+
+def _effect_in_part(facts: Facts) -> str:
+    """Return what the causes of other axes do there."""
+    gap = facts.gap
+    axes = sorted({a for c in facts.causes for a in axes_of(c)})
+    if len(axes) != 1:
+        return (
+            f"The {gap_of(gap.compared)} on validation logs goes from {percent(gap.before)} to "
+            f"{percent(gap.after)} of the {_torque(facts)} (noise alone: {percent(gap.floor)})."
+        )
+    before, after, floor = (
+        percent(float(x[axes[0] - 1]))
+        for x in (gap.before_per_axis, gap.after_per_axis, gap.floor_per_axis)
+    )
+    act = deed(facts.causes, facts.own, facts.causes, facts.n_axes)
+    return f"{act} takes the gap of axis {axes[0]} from {before} to {after} (noise alone: {floor})."
+
+
+def _contradiction(facts: Facts) -> str:
+    """Return why causes are not named that explain the estimation logs."""
+    seen = facts.withdrawn
+    if seen is None:
+        return ""
+    of = f"of the {_torque(facts)}"
+    before, after, floor = (percent(x) for x in (seen.before, seen.after, seen.floor))
+    tried = _tried(seen)
+    there = "" if seen.axis is None else f" on axis {seen.axis} of {seen.log}"
+    if seen.why == "none":
+        return (
+            f"The estimation logs lack no effect, but that does not carry over to the validation logs: {after} "
+            f"{of} is left{there} (noise alone: {floor})."
+        )
+    if seen.why == "bent":
+        return (
+            f"{tried} would explain it only with {100 * seen.share:.0f} % of the simulator's own parameters at the "
+            "edge of their tolerance."
+        )
+    if seen.why == "part":
+        return (
+            f"{tried} explains only a part: with it the gap on validation logs goes from {before} to {after} {of}."
+        )
+    if seen.why == "refit":
+        return (
+            f"{tried} does not carry over to the validation logs: the gap is {after} {of} with it, and {before} "
+            "with the re-fit alone."
+        )
+    return (
+        f"{tried} does not carry over to the validation logs: with it the gap{there} goes from {before} to "
+        f"{after} {of}."
+    )
+
+
+def _tried(seen: Withdrawal) -> str:
+    """Return what was withdrawn, as the subject of a sentence."""
+    if not seen.causes or len(seen.causes) > _RIVALS:
+        return "What explains the estimation logs"
+    return _capital(listed([placed(label) for label in seen.causes], "with"))
+
+
+def _regime(where: Where) -> str:
+    """Return where on its axis a gap lies: ``, mostly at 0.5-6 Hz (speed: slow)``; empty where nothing stands out."""
+    band = "" if where.band_hz is None else f", mostly at {where.band_hz[0]:g}-{where.band_hz[1]:g} Hz"
+    return band if where.regime is None else f"{band} ({where.regime})"
+
+
+def _torque(facts: Facts) -> str:
+    return torque_of(facts.gap.compared)
+
+
+def _capital(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}"

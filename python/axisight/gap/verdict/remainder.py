@@ -1,8 +1,8 @@
-"""What is left once the causes are in, and the re-fitted parameters that look suspicious."""
+"""The gap that is left with the causes in, and re-fits that look suspicious."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -19,25 +19,32 @@ _WORSE = 0.2
 
 
 def remainder_of(
-    stages: Stages, gap: Gap, logs: Sequence[ErrorLog], settings: Settings
+    stages: Stages,
+    gap: Gap,
+    logs: Sequence[ErrorLog],
+    settings: Settings,
+    quiet: Collection[int] = (),
 ) -> Remainder:
     """Return what stands above the floor with the causes in.
 
-    ``logs``: the validation logs with the error that remains and noise alone. Axes that stand above
-    the floor of no log, and simulations that broke off, have no place.
+    ``logs``: the validation logs with the error that remains and noise alone. ``quiet``: axes (from 1) whose
+    verdict is *none*. These have no place, nor have axes that stand above the floor of no log, nor
+    simulations that broke off.
     """
     per_axis = np.sqrt(np.maximum(gap.after_per_axis**2 - gap.floor_per_axis**2, 0.0))
     total = float(np.sqrt(max(gap.after**2 - gap.floor**2, 0.0)))
     standing = np.any(above_floor(stages.after, stages) > 0, axis=0)
+    standing &= ~np.isin(np.arange(1, len(per_axis) + 1), list(quiet))
     whole = all(len(x.noise) == len(x.error) for x in logs)
     if not np.any(standing) or not np.isfinite(total) or not whole:
         return Remainder(total, per_axis)
     bands = band_map(logs, settings.block_s)
     regimes = regime_maps(logs, settings.bandwidth_hz, settings.block_s)
     shares = per_axis**2 / max(float(np.sum(per_axis**2)), 1e-300)
+    of = "of what remains of the squared gap above the floor"
     where = sorted(
         (
-            placed(bands, regimes, int(i), float(shares[i]), settings.significance)
+            placed(bands, regimes, int(i), float(shares[i]), settings.significance, of)
             for i in np.flatnonzero(standing)
         ),
         key=lambda w: -w.share,
@@ -51,11 +58,11 @@ def remainder_of(
 def reversals_smeared(
     left: Remainder | None, places: Sequence[Where], cutoff_hz: float | None
 ) -> tuple[Finding, ...]:
-    """Return a finding for axes where what remains lies around reversals, which a low-pass smears.
+    """Return a finding for axes where the remainder lies around reversals, which a low-pass smears.
 
-    Of a torque that jumps there a low-pass of ``cutoff_hz`` leaves a slope of half a period, as wide as
-    laws of friction differ; without one (closed loop) there is none. ``places``: of the whole gap, whose
-    more logs tell the regime where the remainder's do not.
+    A low-pass of ``cutoff_hz`` turns the jump of the torque into a slope of half a period. Laws of friction
+    differ over the same width. None without a low-pass (closed loop). ``places``: of the whole gap; it has
+    more logs and may tell the regime where the remainder does not.
     """
     if left is None or cutoff_hz is None:
         return ()
@@ -64,8 +71,8 @@ def reversals_smeared(
         Finding(
             "reversals_smeared",
             "flag",
-            f"axis {axis}: what remains lies around reversals, where the low-pass of {cutoff_hz:.3g} Hz "
-            f"smears dry friction: try --cutoff-hz {2 * cutoff_hz:.3g}, before something unknown is looked for",
+            f"axis {axis}: the rest of the gap lies around reversals of speed. The low-pass of {cutoff_hz:.3g} Hz "
+            f"smears dry friction there. Try --cutoff-hz {2 * cutoff_hz:.3g} before you look for another effect",
             None,
             axis,
             "cutoff_hz",
@@ -86,9 +93,9 @@ def refit_worse(stages: Stages, names: Sequence[str]) -> tuple[Finding, ...]:
     for name, before, after, noise in zip(names, given, refitted, floor, strict=True):
         if after - before > _WORSE * max(before - noise, noise):
             message = (
-                f"re-fitted on the estimation logs, the simulator's own parameters raise the gap from "
-                f"{percent(float(np.sqrt(before)))} to {percent(float(np.sqrt(after)))}: what they were fitted "
-                f"to is no property of the machine; state tighter tolerances."
+                f"the re-fit on the estimation logs raises the gap of this log from "
+                f"{percent(float(np.sqrt(before)))} to {percent(float(np.sqrt(after)))}. The parameters were fitted "
+                f"to something that is no property of the machine. State tighter tolerances"
             )
             out.append(Finding("refit_worse", "flag", message, log=name, field="tolerances"))
     return tuple(out)

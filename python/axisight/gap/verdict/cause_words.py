@@ -1,0 +1,156 @@
+"""Causes in sentences: what the simulator lacks, what it has with a wrong value, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from axisight.effects import Effect, article, effect_info, noun
+from axisight.gap.facts.axis_names import always_there
+from axisight.gap.facts.result import Cause
+from axisight.gap.facts.wording import listed
+
+# Numbers of axes in words.
+_COUNTS = {2: "both", 3: "all three", 4: "all four", 5: "all five", 6: "all six", 7: "all seven"}
+# Phrases of a list that are told; more are counted.
+_MOST = 4
+# Axes whose wrong values are told by number.
+_NUMBERED = 3
+
+
+def in_order(causes: Sequence[Cause]) -> list[Cause]:
+    """Return causes by effect, in the order in which effects first come, then by axis."""
+    first = {c.effect: i for i, c in reversed(list(enumerate(causes)))}
+    return sorted(causes, key=lambda c: (first[c.effect], c.axis or 0))
+
+
+def named(causes: Sequence[Cause], n_axes: int = 0) -> str:
+    """Return causes in words, one phrase an effect: "Coulomb friction on axes 1, 2 and 5".
+
+    ``n_axes``: of the robot. Effects that differ by an adjective and have the same axes share a phrase:
+    "Coulomb and viscous friction".
+    """
+    return listed(_told(_phrases(causes, n_axes)))
+
+
+def sure(causes: Sequence[Cause], own: Sequence[Effect], n_axes: int) -> str:
+    """Return a sentence about causes; those of one place begin with it: "Axis 2: the simulator lacks backlash."
+
+    ``own``: effects of the simulator. What it has with another value is wrong, and not lacking.
+    """
+    wrong = [c for c in in_order(causes) if _is_wrong(c, own)]
+    lacking = [c for c in in_order(causes) if c not in wrong]
+    places = {axes_of(c) for c in causes}
+    if len(places) == 1:
+        (where,) = places
+        parts = [f"the simulator lacks {named(_anywhere(lacking))}"] if lacking else []
+        parts += [f"the {x}" for x in _wrong(wrong, own, told_place=False)]
+        text = listed(parts)
+        lead = place(where, n_axes)
+        return f"{lead[:1].upper()}{lead[1:]}: {text}." if lead else f"{text[:1].upper()}{text[1:]}."
+    out = [f"The simulator lacks {named(lacking, n_axes)}."] if lacking else []
+    if wrong:
+        text = listed(_told([f"the {x}" for x in _wrong(wrong, own, told_place=True, n_axes=n_axes)]))
+        out.append(f"{text[:1].upper()}{text[1:]}.")
+    return " ".join(out)
+
+
+def deed(causes: Sequence[Cause], own: Sequence[Effect], every: Sequence[Cause], n_axes: int) -> str:
+    """Return what to do about causes, of ``every`` cause that was named: "Adding it", "Correcting them"."""
+    wrong = [_is_wrong(c, own) for c in causes]
+    verb = "Correcting" if all(wrong) else "Changing" if any(wrong) else "Adding"
+    if len(causes) < len(every):
+        return f"{verb} {named(_anywhere(causes) if len({axes_of(c) for c in every}) == 1 else causes, n_axes)}"
+    return f"{verb} {'it' if len(causes) == 1 else 'them'}"
+
+
+def axes_of(cause: Cause) -> tuple[int, ...]:
+    """Return the axes (from 1) of a cause, none of the whole arm."""
+    return cause.axes or (() if cause.axis is None else (cause.axis,))
+
+
+def place(axes: Sequence[int], n_axes: int) -> str:
+    """Return axes in words, without a preposition: "axis 2", "axes 1 and 2", "all six axes"; empty of none."""
+    if not axes:
+        return ""
+    if 1 < len(axes) == n_axes:
+        return f"{_COUNTS.get(n_axes, f'all {n_axes}')} axes"
+    return f"{'axis' if len(axes) == 1 else 'axes'} {listed([str(a) for a in axes])}"
+
+
+def _is_wrong(cause: Cause, own: Sequence[Effect]) -> bool:
+    """Whether every simulator has what the effect changes, or this one has the effect."""
+    return always_there(cause.effect) or _of_simulator(cause, own) is not None
+
+
+def _of_simulator(cause: Cause, own: Sequence[Effect]) -> Effect | None:
+    """Return the effect of the simulator that a cause gives other values."""
+    same = (e for e in own if e.acts and (e.name, e.axis) == (cause.effect, cause.axis))
+    return next(same, None)
+
+
+def _anywhere(causes: Sequence[Cause]) -> list[Cause]:
+    return [Cause(c.effect, None, c.probability, {}, {}, c.gap_reduction) for c in causes]
+
+
+def _told(phrases: Sequence[str]) -> list[str]:
+    """Return phrases as far as a sentence bears them."""
+    if len(phrases) <= _MOST:
+        return list(phrases)
+    return [*phrases[: _MOST - 1], f"{len(phrases) - _MOST + 1} more effects"]
+
+
+def _phrases(causes: Sequence[Cause], n_axes: int) -> list[str]:
+    axes: dict[str, list[int]] = {}
+    for c in in_order(causes):
+        axes.setdefault(c.effect, []).extend(axes_of(c))
+    phrases: dict[tuple[str, str, tuple[int, ...]], list[str]] = {}
+    for effect, mine in axes.items():
+        start = article(effect)
+        start = start if start in ("a", "an") else ""
+        adjective, _, head = noun(effect).rpartition(" ")
+        # Two delays are two things; friction of two kinds is one.
+        shared = noun(effect) if start else head
+        key = (start, shared, tuple(mine))
+        phrases.setdefault(key, []).append(adjective if shared == head else "")
+    return [
+        " ".join(x for x in (start, listed(adjectives), head, _on(where, n_axes)) if x)
+        for (start, head, where), adjectives in phrases.items()
+    ]
+
+
+def _on(axes: Sequence[int], n_axes: int) -> str:
+    return f"on {place(axes, n_axes)}" if axes else ""
+
+
+def _wrong(
+    causes: Sequence[Cause], own: Sequence[Effect], *, told_place: bool, n_axes: int = 0
+) -> list[str]:
+    """Return a phrase an effect that the simulator has with a wrong value: "motor inertia of the simulator is wrong".
+
+    The machine's value stands behind it where an effect is one number on few axes.
+    """
+    out = []
+    for effect in dict.fromkeys(c.effect for c in causes):
+        mine = [c for c in causes if c.effect == effect]
+        where = place([a for c in mine for a in axes_of(c)], n_axes) if told_place else ""
+        numbers = [text for c in mine if (text := _of_machine(c, _of_simulator(c, own)))]
+        told = 0 < len(numbers) == len(mine) <= _NUMBERED
+        machine = f" (machine: {listed(numbers)})" if told else ""
+        at = f" of {where}" if where else ""
+        out.append(f"{noun(effect)}{at} in the simulator is wrong{machine}")
+    return out
+
+
+def _of_machine(cause: Cause, simulator: Effect | None) -> str:
+    """Return what the machine has, of an effect that is one number: "+45 %", or "0.61 Nm, simulator: 0.5 Nm"."""
+    sizes = [p.name for p in effect_info(cause.effect).parameters if p.role == "amplitude"]
+    name = sizes[0]
+    if len(sizes) != 1 or name not in cause.parameters:
+        return ""
+    value = cause.parameters[name].value
+    if name.startswith("relative_"):
+        return f"{100 * value:+.2g} %"
+    given = None if simulator is None else (simulator.parameters or {}).get(name)
+    unit = cause.units.get(name, "1").partition(" (")[0]
+    unit = "" if unit == "1" else f" {unit}"
+    return "" if given is None else f"{value:.3g}{unit}, simulator: {given:.3g}{unit}"
