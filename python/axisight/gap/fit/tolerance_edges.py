@@ -34,10 +34,10 @@ def parameters_at_edge(
         bound = (None, name) in fitted.ended_at_bound
         if bound or abs(change) >= _EDGE * tolerance:
             message = (
-                f"ended {100 * change:+.3g} % off the simulator's value, "
-                f"{abs(change) / tolerance:.1f} of its tolerance of {100 * tolerance:g} %"
-                f"{', at the bound of the fit' if bound else ''}: the value or the tolerance is "
-                f"wrong, or something that no effect stands for pulls at it."
+                f"the re-fit ended {100 * change:+.3g} % off the simulator's value, "
+                f"{abs(change) / tolerance:.1f} times its tolerance of {100 * tolerance:g} %"
+                f"{', at the bound of the fit' if bound else ''}. Check value and tolerance in the robot file. If both "
+                "are right, something unmodelled acts there"
             )
             out.append(Finding("parameter_at_edge", "flag", message, field=name))
     return tuple(out)

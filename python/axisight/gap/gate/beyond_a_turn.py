@@ -33,8 +33,7 @@ def check_turns(robot: Robot, log: Log) -> list[Finding]:
     name = "position_in_degrees" if top <= LARGEST_JOINT_DEG else "position_scaled"
     axes = ", ".join(str(i + 1) for i in beyond)
     message = (
-        f"expected joints that turn by no more than {LARGEST_JOINT_RAD:g} rad, got up to {top:.3g} on axes "
-        f"{axes}: degrees, or angles of motors? state the unit and the gear of positions and targets in a "
-        "column map"
+        f"expected joint angles of at most {LARGEST_JOINT_RAD:g} rad, got up to {top:.3g} on axes {axes}. Are "
+        "these degrees, or motor angles? State the unit and the gear of positions and targets in a column map"
     )
     return [Finding(name, "refuse", message, log.name, None, "position")]

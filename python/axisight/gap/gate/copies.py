@@ -33,8 +33,8 @@ def check_copies(estimation: Sequence[Log], validation: Sequence[Log]) -> list[F
             for j in range(i):
                 if _shared(own_tables[i], own_tables[j]) >= _COPY:
                     message = (
-                        f"expected a new run, got the content of {logs[j].name}: it would count "
-                        "twice; take it out"
+                        f"expected a new run, got the content of {logs[j].name}. It would count twice. Leave "
+                        "this log out"
                     )
                     out.append(Finding("log_repeated", "refuse", message, log.name, None, "file"))
     for log, own in zip(validation, held, strict=True):
@@ -44,8 +44,8 @@ def check_copies(estimation: Sequence[Log], validation: Sequence[Log]) -> list[F
                 continue
             severity: GateSeverity = "refuse" if share >= _COPY else "flag"
             message = (
-                f"expected a run that took no part in the fit, got {100 * share:.3g} % of its rows "
-                f"in {other.name}: the gap would be that of the fit; hold out another run"
+                f"expected a run that is not used for fitting, got {100 * share:.3g} % of its rows in "
+                f"{other.name}. Its gap would be that of the fit. Use another run for validation"
             )
             out.append(
                 Finding("validation_copies_estimation", severity, message, log.name, None, "role")

@@ -155,8 +155,8 @@ def _references(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     if robot.controller_kind == "none" or not missing or len(missing) == len(logs):
         return []
     message = (
-        "expected velocity references as in the other logs, got none: all logs are compared by "
-        "inverse dynamics, without the controller; add them or leave this log out"
+        "expected velocity references as in the other logs, got none. All logs are compared by inverse "
+        "dynamics, without the controller. Add the references, or leave this log out"
     )
     return [
         Finding("reference_missing", "flag", message, log.name, None, "velocity_ref")

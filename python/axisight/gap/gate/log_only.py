@@ -26,7 +26,7 @@ _OPTIONAL = {"velocity": "velocity_rad_s"}
 # A dead channel of an axis whose reference travels this far [rad, or m] is no axis at rest: a
 # thousand times the noise of a usual motor sensor.
 _TRAVEL = 0.01
-_LIMIT = ", or the drive is at its limit all the time and cannot hold the arm"
+_LIMIT = ", or the drive stays at its limit and cannot hold the arm"
 
 
 def channels(log: Log) -> tuple[dict[Channel, Array], dict[Channel, str]]:
@@ -80,8 +80,8 @@ def _reference_missing(finding: LogFinding, values: Array) -> LogFinding:
     if not finding.column.startswith("velocity_ref") or not np.isnan(values).all():
         return finding
     message = (
-        "expected a velocity reference for all axes or for none, got NaN only: write the reference "
-        "of the axis, zero if it rests"
+        "expected a velocity reference for all axes or for none, got NaN only. Write the reference of the axis; "
+        "zero if it rests"
     )
     return LogFinding("error", finding.column, message, "reference_missing", finding.axis)
 
@@ -101,8 +101,8 @@ def _dead(finding: Finding, log: Log) -> Finding:
         return finding
     at_limit = finding.field.startswith("torque") and bool(np.any(log.torque_nm[:, axis]))
     message = (
-        f"expected a signal, got one that is {finding.message} while the axis travels "
-        f"{travel:.4g} rad: the channel is dead or was not recorded{_LIMIT if at_limit else ''}"
+        f"expected a signal, got one that is {finding.message} while the axis travels {travel:.4g} rad. The "
+        f"channel is dead or was not recorded{_LIMIT if at_limit else ''}. Record it again, or leave the log out"
     )
     return Finding(finding.name, "refuse", message, log.name, finding.axis, finding.field)
 
@@ -113,8 +113,8 @@ def _clipped(log: Log, labels: dict[Channel, str]) -> list[Finding]:
         count = clipped_samples(np.ascontiguousarray(log.position_rad[:, axis]))
         if count:
             message = (
-                f"expected a motion, got {count} samples cut at the largest or smallest position "
-                "though the axis was about to go on: range of the sensor, or an end stop?"
+                f"expected a motion, got {count} samples cut at the largest or smallest position, while the axis "
+                "moved towards it. Check the range of the sensor and the end stops"
             )
             column = labels["position", axis]
             out.append(Finding("position_clipped", "flag", message, log.name, axis + 1, column))
@@ -139,7 +139,7 @@ def _velocity(log: Log, slides: list[bool]) -> list[Finding]:
             prismatic=slides[axis],
         ):
             if finding.severity != "ok" and finding.column == column:
-                message = f"{finding.message}; the motion is taken from the position"
+                message = f"{finding.message}. The motion is taken from the position instead"
                 out.append(
                     Finding("velocity_inconsistent", "flag", message, log.name, axis + 1, column)
                 )

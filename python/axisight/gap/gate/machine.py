@@ -21,7 +21,10 @@ def check_machine(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     out = _gears(robot)
     for log in logs:
         if log.n_axes != robot.n_axes:
-            message = f"expected {robot.n_axes} axes as in the robot, got {log.n_axes}"
+            message = (
+                f"expected {robot.n_axes} axes as in the robot, got {log.n_axes}. Use the robot file of this "
+                "machine, or a column map that names its axes"
+            )
             out.append(Finding("axes_differ", "refuse", message, log.name, None, "axis"))
         factor = log.sample_time_s / robot.sample_time_s
         if abs(factor - 1.0) > RATE_TOLERANCE:
@@ -41,7 +44,7 @@ def _another_rate(robot: Robot, log: Log, factor: float) -> Finding:
     name, unit = _DIFFERS, ""
     for known, known_name, words in ((1e3, "time_in_ms", "ms"), (1e6, "time_in_us", "us")):
         if abs(factor / known - 1.0) < 0.01:
-            name, unit = known_name, f": time in {words}? It has to be in s"
+            name, unit = known_name, f": time in {words}? Write it in s"
     message = (
         f"expected the robot's sample time {robot.sample_time_s:g} s, got {log.sample_time_s:g} s"
         f"{unit}"
@@ -57,8 +60,8 @@ def _gears(robot: Robot) -> list[Finding]:
         if slides or abs(ratio) <= _SUSPICIOUS_RATIO:
             continue
         message = (
-            f"expected joint angle per motor angle, at most 1 (0.00446 for a gear of 224:1), got "
-            f"{ratio:g}: write {1 / ratio:.6g}?"
+            f"expected joint angle per motor angle, at most 1 (0.00446 for a gear of 224:1), got {ratio:g}. Did "
+            f"you mean {1 / ratio:.6g}?"
         )
         severity = "refuse" if abs(ratio) > _IMPOSSIBLE_RATIO else "flag"
         out.append(

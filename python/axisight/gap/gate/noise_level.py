@@ -32,8 +32,8 @@ def check_noise(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
             few = found is not None and stated <= 0 and found.bits < _FEW_BITS
             if coarse or few:
                 message = (
-                    f"expected the position's noise of {stated:.3g} rad, got steps of {step:.4g} rad: "
-                    "what is finer does not show, and the floor rises; log the full resolution"
+                    f"expected noise of {stated:.3g} rad as in the robot file, got steps of {step:.4g} rad. Finer "
+                    "motion does not show, and the floor rises. Log the full resolution"
                 )
                 out.append(
                     Finding("quantized_position", "flag", message, log.name, axis + 1, column)
@@ -43,8 +43,8 @@ def check_noise(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
         measured = position_noise_std([log])
         for axis in np.flatnonzero(measured > _LOUD * stated).tolist():
             message = (
-                f"expected noise of {stated:.3g} rad as in the robot file, got {measured[axis]:.3g} rad: "
-                "the floor of the diagnosis rises with it; look for glitches and a coarse encoder"
+                f"expected noise of {stated:.3g} rad as in the robot file, got {measured[axis]:.3g} rad. The "
+                "floor rises with it. Look for glitches and a coarse encoder"
             )
             column = f"position_{axis + 1}"
             out.append(Finding("position_noise_large", "flag", message, log.name, axis + 1, column))

@@ -28,9 +28,9 @@ def check_start(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
             continue
         for axis in np.flatnonzero(np.abs(off) > OFFSET_RAD):
             message = (
-                f"expected a log that starts at the robot's operating point, got a start "
-                f"{off[axis]:.4g} rad (joint side) beside it: the simulator starts at the operating "
-                "point; put the pose into the robot file, or subtract the offset of the encoder"
+                f"expected a log that starts at the robot's operating point, got a start {off[axis]:.4g} rad "
+                "(joint side) away from it. The simulator starts at the operating point. Write the pose into the "
+                "robot file, or subtract the offset of the encoder"
             )
             column = f"position_{axis + 1}"
             out.append(Finding("position_offset", "flag", message, log.name, int(axis) + 1, column))
@@ -52,8 +52,8 @@ def _gravity(robot: Robot, log: Log) -> list[Finding]:
         return []
     axes = ", ".join(str(i + 1) for i in np.flatnonzero(holds))
     message = (
-        f"expected mean torques as the simulator's, got them with the other sign on every axis that "
-        f"holds a load ({axes}; factors {', '.join(f'{r:.3g}' for r in ratio)}): turn the gravity of "
-        "the robot file round, or the torques of the log"
+        "expected mean torques like the simulator's, got them with the other sign on every axis that holds a "
+        f"load ({axes}; factors {', '.join(f'{r:.3g}' for r in ratio)}). Change the sign of gravity in the robot "
+        "file, or that of the torques"
     )
     return [Finding("gravity_flipped", "refuse", message, None, None, "gravity")]

@@ -190,17 +190,16 @@ def _from(log: Log, start_s: float) -> Finding:
     if log.run_up is not None:
         return begins_in_motion(log, start_s)
     message = (
-        f"expected a start at rest, where a simulation of the loop begins, got one in motion: taken from "
-        f"{start_s:.4g} s, where all axes first stand"
+        f"expected a start at rest, like the simulation, got a start in motion. The log is used from {start_s:.4g} s, "
+        "where all axes first stand still"
     )
     return Finding("begins_in_motion", "flag", message, log.name, None, "position")
 
 
 def _without_references(names: Sequence[str], why: NotRunUpError) -> Finding:
     message = (
-        f"expected starts at rest, where a simulation of the loop begins, got starts in motion, "
-        f"no rest of {REST_S:g} s in the first half of {', '.join(names)}, and no beginning to simulate from "
-        f"({why}): torques are predicted from the measured motion instead, without the references; log from "
-        f"rest, log longer, or leave these logs out"
+        f"expected starts at rest, like the simulation, got starts in motion. The first half of {', '.join(names)} "
+        f"has no rest of {REST_S:g} s, and no start can be estimated ({why}). All logs are compared by inverse "
+        "dynamics, without the references. Log from rest, log longer, or leave these logs out"
     )
     return Finding("begins_in_motion", "flag", message, names[0], None, "position")

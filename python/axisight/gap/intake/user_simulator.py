@@ -40,11 +40,11 @@ def said(found: Reproduction, compared: Compared = "torques") -> str:
     """Return a sentence about how far the model reproduces the user's simulator."""
     axes = ", ".join(f"axis {i + 1}: {100 * x:.2g} %" for i, x in enumerate(found.per_axis))
     whose = (
-        "the gap is that of your simulator, from the logs less this difference"
+        "The gap is that of your simulator: the difference is subtracted from the logs"
         if found.taken_off
-        else "the gap is that of the model, for your simulator goes other ways than the machine"
+        else "The gap is that of the model, because your simulator moves differently from the machine"
     )
-    return f"The model differs from your simulator by {axes} of its {torque_of(compared)}; {whose}."
+    return f"The model differs from your simulator by {axes} of its {torque_of(compared)}. {whose}."
 
 
 def noted(found: Reproduction) -> list[Finding]:
@@ -60,8 +60,8 @@ def _finding(found: Reproduction, axis: int) -> Finding:
     regime = "" if place.regime is None else f", {place.regime}"
     message = (
         f"expected a model that reproduces your simulator, got one that differs from it on axis "
-        f"{axis + 1} by {100 * found.of_gap[axis]:.3g} % of the gap{band}{regime}; diagnose the "
-        "simulated logs themselves to see what the model lacks of it"
+        f"{axis + 1} by {100 * found.of_gap[axis]:.3g} % of the gap{band}{regime}. Diagnose the simulated logs "
+        "themselves: the causes are what the model lacks"
     )
     return Finding("simulator_differs", "flag", message, None, axis + 1, "simulated")
 

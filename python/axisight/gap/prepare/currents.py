@@ -48,16 +48,14 @@ class Nominal:
         """Return what is to be said of it; ``change``: by what share of it [1] the fit found the constant off."""
         said = f"expected a torque constant, got none: currents were read with {self.nm_per_a:.4g} Nm/A ({self.source})"
         if change is None:
-            said += (
-                "; a diagnosis fits it, and takes a constant off by a factor of two for no cause"
-            )
+            said += ". A diagnosis fits the constant; a factor of two from this value is no cause"
         else:
             value, low, high = (
                 self.nm_per_a * (1 + x) for x in (change.value, change.low, change.high)
             )
             said += (
-                f", and the logs say {value:.4g} Nm/A (95 %: {low:.4g} to {high:.4g}), with which causes have their "
-                f"values; that it differs is no cause"
+                f". In the fit the logs say {value:.4g} Nm/A (95 %: {low:.4g} to {high:.4g}). Values of causes rest "
+                "on it. The difference is no cause. State the constant to be sure"
             )
         return Finding("torque_constant_unknown", "flag", said, None, self.axis, "torque")
 

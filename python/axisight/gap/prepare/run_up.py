@@ -175,9 +175,8 @@ def _behind(log: Log, burn_s: float) -> Log:
 def begins_in_motion(log: Log, start_s: float) -> Finding:
     """Return what is to be said of a log with a run-up that is compared from ``start_s`` of what was logged."""
     message = (
-        f"expected a start at rest, where a simulation of the loop begins, got one in motion, and no rest in the "
-        f"first half: simulated from an estimated beginning, run up from rest to the position, speed and "
-        f"reference measured there, and compared from {start_s:.4g} s, where the loop has forgotten all but "
-        f"{100 * FORGOTTEN:g} % of what is wrong of it"
+        "expected a start at rest, like the simulation, got a start in motion and no rest in the first half. The "
+        "simulation is run up from rest to the measured position, speed and reference. It is compared from "
+        f"{start_s:.4g} s, where the loop has forgotten all but {100 * FORGOTTEN:g} % of an error of that start"
     )
     return Finding("begins_in_motion", "flag", message, log.name, None, "position")

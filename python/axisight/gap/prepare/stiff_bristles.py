@@ -36,8 +36,8 @@ def _value(effect: Effect, parameter: str) -> float:
 
 def _told(effect: Effect, relaxation: str, step: float) -> Finding:
     message = (
-        f"{effect.label}: expected {relaxation} of a sample time ({step:g} s) or more, got "
-        f"{_value(effect, relaxation):g}: bristles slip faster than the fixed steps of a fit follow. They are "
-        f"taken with {step:g} s, and touch and part over as long."
+        f"{effect.label}: expected {relaxation} of at least a sample time ({step:g} s), got "
+        f"{_value(effect, relaxation):g}. The bristles slip faster than the fixed steps of a fit can follow. "
+        f"{step:g} s is used instead"
     )
     return Finding("bristles_slowed", "flag", message, axis=effect.axis, field=relaxation)

@@ -80,8 +80,9 @@ def _told(option: Hypothesis, fitted: Effect, tolerance: float) -> Finding:
         if name in option.free and option.stated[name]
     )
     message = (
-        f"{fitted.label}: {off} off what the simulator states. Within {100 * _SCATTER * tolerance:g} %, three of "
-        f"the tolerance of {KNOWN_AS}, that is scatter of machines and no cause: the gap is counted with it."
+        f"{fitted.label}: the logs say {off} off the simulator's value. Up to {100 * _SCATTER * tolerance:g} % "
+        f"(three tolerances of {KNOWN_AS}) is scatter between machines and no cause. The gap is counted with the "
+        "logs' value"
     )
     return Finding("effect_within_scatter", "flag", message, axis=fitted.axis, field=fitted.name)
 

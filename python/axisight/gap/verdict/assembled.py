@@ -183,7 +183,9 @@ def _places(
         return ()
     bands, regimes, significance = maps
     unknown = conclusion.verdict == "unknown"
-    told = [a for a in conclusion.axes if a.verdict == "unknown" or not (unknown or a.verdict == "none")]
+    told = [
+        a for a in conclusion.axes if a.verdict == "unknown" or not (unknown or a.verdict == "none")
+    ]
     axes = [a.axis for a in told]
     seen = of_axes(bands, axes)
     of = f"of the squared gap {'that no effect explains' if unknown else 'before the causes'}"

@@ -14,11 +14,12 @@ An axis has a gap where one of these holds:
 
 | evidence | limit |
 |---|---|
-| a validation log stands above what passes for the floor | `axisight.gap.verdict.carry_over.above_floor` |
-| the residual of the estimation logs stands above noise, and the gap of the validation logs above the floor | ``largest_scatter``, and 10 % above the floor |
-| the residual of the estimation logs is too large for noise of another colour, by inverse dynamics | 1.0 |
+| a validation log stands above what passes for the floor | as `carry_over.above_floor` |
+| the simulation of a validation log broke off | |
+| the residual of the estimation logs has an excess, and the validation logs a gap | 0.3; 10 % above the floor |
+| the same excess is too large for noise of another colour, by inverse dynamics | 1.0 |
 
-In a closed loop the residual of one axis shows on the others, so the third row needs inverse dynamics.
+Excess is that of `AxisVerdict`; 0.3 is ``Settings.largest_scatter``. In a closed loop the residual of one axis shows on the others, so the last row needs inverse dynamics.
 """
 
 from __future__ import annotations
@@ -182,9 +183,7 @@ def with_axes_agreed(
         Acting(c.axes or (() if c.axis is None else (c.axis,)), c.label in still_open)
         for c in conclusion.causes
     ]
-    axes = axis_verdicts(
-        conclusion.verdict, evidence, causes, settings, own_residual=own_residual
-    )
+    axes = axis_verdicts(conclusion.verdict, evidence, causes, settings, own_residual=own_residual)
     return replace(conclusion, axes=axes)
 
 

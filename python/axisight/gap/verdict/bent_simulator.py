@@ -1,4 +1,4 @@
-"""Whether causes hold with a simulator that is not bent to what they leave."""
+"""Whether causes still explain the gap with the simulator's own parameters kept near their values."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ _HOLD = 0.95
 
 
 def bent_for(fitter: ModelFitter, found: SearchState) -> float:
-    """Return the share of the simulator's own parameters at the edge, where the causes need them there [1].
+    """Return the share of own parameters at the edge of their tolerance [1]; zero where the causes do without.
 
-    What causes leave of a large gap is large against noise, and takes everything along that the logs hardly
-    tell. Where the causes explain as much without, nothing that matters was bent.
+    The rest of a large gap is large against noise. It pulls parameters that the logs hardly determine to the
+    edge of their tolerance. That is harmless where the causes explain as much with these parameters kept
+    near their values.
     """
     share = bent(fitter, found.model)
     asked = share >= BENT and len(found.model.free) > 0

@@ -74,7 +74,9 @@ def carried_over(
     elif conclusion.causes:
         withdrawn = _no_fall(stages, gap, names, settings, stepped, labels)
         if withdrawn is None and bent >= BENT:
-            withdrawn = Withdrawal("bent", gap.before, gap.after, gap.floor, None, None, labels, bent)
+            withdrawn = Withdrawal(
+                "bent", gap.before, gap.after, gap.floor, None, None, labels, bent
+            )
     elif conclusion.verdict == "none":
         withdrawn = _above_floor(stages, names)
     if withdrawn is None:

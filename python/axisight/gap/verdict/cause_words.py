@@ -33,7 +33,7 @@ def named(causes: Sequence[Cause], n_axes: int = 0) -> str:
 
 
 def sure(causes: Sequence[Cause], own: Sequence[Effect], n_axes: int) -> str:
-    """Return a sentence about causes; those of one place begin with it: "Axis 2: the simulator lacks backlash."
+    """Return a sentence about causes, ``Axis 2: the simulator lacks backlash.`` where all are of one place.
 
     ``own``: effects of the simulator. What it has with another value is wrong, and not lacking.
     """
@@ -46,15 +46,21 @@ def sure(causes: Sequence[Cause], own: Sequence[Effect], n_axes: int) -> str:
         parts += [f"the {x}" for x in _wrong(wrong, own, told_place=False)]
         text = listed(parts)
         lead = place(where, n_axes)
-        return f"{lead[:1].upper()}{lead[1:]}: {text}." if lead else f"{text[:1].upper()}{text[1:]}."
+        return (
+            f"{lead[:1].upper()}{lead[1:]}: {text}." if lead else f"{text[:1].upper()}{text[1:]}."
+        )
     out = [f"The simulator lacks {named(lacking, n_axes)}."] if lacking else []
     if wrong:
-        text = listed(_told([f"the {x}" for x in _wrong(wrong, own, told_place=True, n_axes=n_axes)]))
+        text = listed(
+            _told([f"the {x}" for x in _wrong(wrong, own, told_place=True, n_axes=n_axes)])
+        )
         out.append(f"{text[:1].upper()}{text[1:]}.")
     return " ".join(out)
 
 
-def deed(causes: Sequence[Cause], own: Sequence[Effect], every: Sequence[Cause], n_axes: int) -> str:
+def deed(
+    causes: Sequence[Cause], own: Sequence[Effect], every: Sequence[Cause], n_axes: int
+) -> str:
     """Return what to do about causes, of ``every`` cause that was named: "Adding it", "Correcting them"."""
     wrong = [_is_wrong(c, own) for c in causes]
     verb = "Correcting" if all(wrong) else "Changing" if any(wrong) else "Adding"

@@ -1,11 +1,11 @@
-"""Positions that come in steps: a cause that is noise.
+"""Coarse encoders: steps of a position as a cause that acts like noise.
 
-What steps of an encoder do to the torque differs from run to run, and no simulator can repeat it: they raise
-the floor. Where a simulator leaves no more than that floor, and the noise of its own sensor would leave
-much less, the steps are what the gap is made of, or what is left of it beside other causes.
+The effect of the steps on the torque differs from run to run, so no simulator can repeat it: they raise the
+floor. They are a cause where the simulator leaves no more than that floor, and the noise of the stated sensor
+alone would leave much less.
 
-A torque that is predicted from the measured motion hardly feels them, but the logs show them: positions that
-are far coarser than the stated sensor's lack something in the simulator, which makes none of this gap.
+By inverse dynamics the predicted torque hardly feels the steps, but the logs show them. Positions far coarser
+than the stated sensor are a cause then too, one that makes no part of the gap.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ def with_coarse_encoders(
     stages: Stages,
     measure: Callable[[Sequence[Array]], Stage],
 ) -> tuple[Conclusion, list[Interval]]:
-    """Return a conclusion with the steps of encoders among its causes, and what each explains of the gap.
+    """Return a conclusion with the steps of encoders among its causes, and the share of the gap that each explains.
 
-    *Explained* by them instead of *none*. Where something is unknown, the floor tells nothing.
-    ``steps`` (n_axes,): of positions [rad], where they exceed the sensor's noise. ``logs``: of validation,
-    ``stages`` of them. Unchanged where nothing is made of steps.
+    *None* becomes *explained*. *Unknown* stays as it is, because the floor tells nothing there.
+    ``steps`` (n_axes,): of positions [rad], zero where the sensor's noise is larger. ``logs``: validation
+    logs, ``stages`` of them. Unchanged where no axis has steps that count.
     """
     if conclusion.verdict == "unknown" or not steps.any():
         return conclusion, []
@@ -90,13 +90,11 @@ def _named(axis: int, step: float) -> NamedCause:
     return NamedCause(info.name, effect.axis, _SURE, values, units, info.family, _SURE)
 
 
-_RAISES = (
-    "What they do to the torque no two runs repeat: the floor has it, and no simulator removes it."
-)
+_RAISES = "Their effect on the torque differs from run to run. It is part of the floor; no simulator removes it."
 
 
 def _says(axis: int, step: float, does: str) -> str:
     return (
-        f"Axis {axis + 1}: positions come in steps of {step:.4g} rad, more than the noise of the stated "
-        f"sensor. {does}"
+        f"Axis {axis + 1}: positions come in steps of {step:.4g} rad, larger than the noise of the stated sensor. "
+        f"{does}"
     )

@@ -1,7 +1,7 @@
-"""What logs show of a controller by themselves, where torques are predicted from the measured motion.
+"""Differences of the controller that logs show by themselves, where torques are compared by inverse dynamics.
 
-Along the motion that was, the torque is right whatever commanded it: no such gap tells of gains. The algebra of
-targets, positions and torques does.
+Inverse dynamics predicts the torque from the measured motion, whatever commanded that motion, so its gap tells
+nothing of gains. The controller's law does: targets, positions and torques of the log have to obey it.
 """
 
 from __future__ import annotations
@@ -15,20 +15,22 @@ from axisight.gap.verdict.conclusion import Conclusion, named_shown
 from axisight.gap.views.view import View
 
 SAYS = (
-    "A torque predicted from the measured motion does not feel it: it makes none of this gap, but the "
-    "simulator's own loop would run without it."
+    "A torque predicted from the measured motion does not feel it. It makes none of this gap, but the "
+    "simulator's own loop lacks it."
 )
-"""What is to be said of a cause that the gap does not feel."""
+"""Sentence about a cause that the gap does not feel."""
 NO_SHARE = Interval(0.0, 0.0, 0.0)
 """Its `gap_reduction`."""
 
 
 def with_controllers_shown(conclusion: Conclusion, view: View) -> tuple[Conclusion, list[Interval]]:
-    """Return a conclusion with what is different about the controller behind its causes, and their shares.
+    """Return a conclusion with the differences of the controller behind its causes, and their shares of the gap.
 
-    Gains off by one share and a torque constant off by its inverse are one cause, in the constant's place: a
-    torque that is reported too large. Gains off by one share so small that such a constant does not show may
-    be that: they are said, and no cause.
+    | logs show | named |
+    |---|---|
+    | all gains off by one share, the torque constant by its inverse | a torque sensor gain instead |
+    | all gains off by one share, too small to show as a constant | nothing; a check says so |
+    | anything else | the cause |
     """
     shares, unseen = [], unseen_constant(view.settings)
     for cause in view.unfelt:
@@ -46,7 +48,7 @@ def with_controllers_shown(conclusion: Conclusion, view: View) -> tuple[Conclusi
 
 
 def _with_sensor(conclusion: Conclusion, place: int, sensor: NamedCause) -> Conclusion:
-    """Return a conclusion with a torque sensor in the place of a torque constant, which the gains tell from rivals."""
+    """Return a conclusion with a torque sensor in the place of a torque constant; the gains rule out its rivals."""
     constant = conclusion.causes[place].label
     causes = (*conclusion.causes[:place], sensor, *conclusion.causes[place + 1 :])
     still = tuple(group for group in conclusion.equivalent if constant not in group)

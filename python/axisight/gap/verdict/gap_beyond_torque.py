@@ -1,4 +1,4 @@
-"""Gaps that are no shares of a torque any more: what is wrong there, in words."""
+"""Gaps of more than ten times the torque: what may be wrong there, in words."""
 
 from __future__ import annotations
 
@@ -35,23 +35,25 @@ def beyond_torque(gap: Gap, logs: Sequence[Log]) -> tuple[Finding, ...]:
 def _finding(axis: int, off: float, logs: Sequence[Log], compared: Compared) -> Finding:
     what, column = _WHAT[compared]
     how = (
-        f"is off by more than ten times what {what} scatters"
+        f"is off by more than ten times the standard deviation of {what}"
         if np.isfinite(off)
         else "broke off: its loop is unstable along these logs"
     )
-    message = f"axis {axis + 1}: the simulator {how}; {_reason(axis, logs)}"
+    message = f"axis {axis + 1}: the simulator {how}. {_reason(axis, logs)}"
     return Finding("gap_beyond_torque", "flag", message, None, axis + 1, f"{column}_{axis + 1}")
 
 
 def _reason(axis: int, logs: Sequence[Log]) -> str:
     torques = [log.torque_nm[:, axis] for log in logs]
     if all(np.std(u) <= _CONSTANT * np.abs(u).max(initial=0.0) for u in torques):
-        return "that torque hardly changes: a constant channel, or an axis that never moved"
+        return (
+            "That torque hardly changes. Check for a constant channel or an axis that never moved"
+        )
     if any(_cut(u) for u in torques):
-        return "that torque is cut at a limit: the machine did not get what was commanded"
+        return "That torque is cut at a limit: the machine did not get the commanded torque. Log below the limit"
     return (
-        "expected the right gear ratio, units of torque, direction of gravity and controller in the "
-        "robot file: with another of them a simulator cannot hold itself"
+        "With a wrong gear ratio, unit of torque, direction of gravity or controller a simulator cannot hold "
+        "itself. Check these in the robot file"
     )
 
 

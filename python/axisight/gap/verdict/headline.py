@@ -232,7 +232,9 @@ def _gap_left(facts: Facts) -> str:
             f"On validation logs it does not stand out: {figures}."
         )
     if not math.isfinite(value):
-        return f"Axis {first} has a gap that no known effect explains: the simulation broke off there."
+        return (
+            f"Axis {first} has a gap that no known effect explains: the simulation broke off there."
+        )
     text = f"Axis {first} has a {gap_of(gap.compared)} that no known effect explains: {figures}{where}."
     too = f"{_capital(place(sorted(others), 0))} {'have' if len(others) > 1 else 'has'} one too."
     return f"{text} {too}" if others else text
@@ -287,9 +289,7 @@ def _contradiction(facts: Facts) -> str:
             "edge of their tolerance."
         )
     if seen.why == "part":
-        return (
-            f"{tried} explains only a part: with it the gap on validation logs goes from {before} to {after} {of}."
-        )
+        return f"{tried} explains only a part: with it the gap on validation logs goes from {before} to {after} {of}."
     if seen.why == "refit":
         return (
             f"{tried} does not carry over to the validation logs: the gap is {after} {of} with it, and {before} "
@@ -310,7 +310,9 @@ def _tried(seen: Withdrawal) -> str:
 
 def _regime(where: Where) -> str:
     """Return where on its axis a gap lies: ``, mostly at 0.5-6 Hz (speed: slow)``; empty where nothing stands out."""
-    band = "" if where.band_hz is None else f", mostly at {where.band_hz[0]:g}-{where.band_hz[1]:g} Hz"
+    band = (
+        "" if where.band_hz is None else f", mostly at {where.band_hz[0]:g}-{where.band_hz[1]:g} Hz"
+    )
     return band if where.regime is None else f"{band} ({where.regime})"
 
 

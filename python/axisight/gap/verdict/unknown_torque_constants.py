@@ -1,4 +1,4 @@
-"""Causes that torque constants nobody knows may be instead: what masses and poses do scales as they do."""
+"""Torque constants that nobody knows as rivals of masses and inertias: both scale the torque alike."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from axisight.gap.facts.named_cause import NamedCause
 from axisight.gap.verdict.conclusion import Conclusion
 
 _ADVICE = (
-    "State the torque constants (scale in the column map, or torque_constant in the drive data): without them "
-    "masses and constants do much the same."
+    "State the torque constants (scale in the column map, or torque_constant in the drive data). Without them "
+    "a wrong mass and a wrong constant look alike."
 )
 
 
 def open_with_constants(conclusion: Conclusion, axes: Sequence[int]) -> Conclusion:
-    """Return a conclusion that takes no weight or inertia for certain beside constants that nobody knows.
+    """Return a conclusion in which weights and inertias stay open against unknown torque constants.
 
-    ``axes`` (from 1) of these. *Undecidable* instead of *explained*, each such cause open against the constants.
+    ``axes`` (from 1) of these constants. *Explained* becomes *undecidable*, and each such cause has half its
+    probability.
     """
     like = {c.label: found for c in conclusion.causes if (found := _constants_like(c, axes))}
     if not like or conclusion.verdict not in ("explained", "undecidable"):
@@ -34,7 +35,7 @@ def open_with_constants(conclusion: Conclusion, axes: Sequence[int]) -> Conclusi
 
 
 def _constants_like(cause: NamedCause, axes: Sequence[int]) -> tuple[str, ...]:
-    """Return the labels of the constants, of ``axes``, whose torques a cause changes."""
+    """Return the labels of the constants among ``axes`` that change the torque as a cause does."""
     scales = effect_info(cause.effect).scales
     if scales is None:
         return ()

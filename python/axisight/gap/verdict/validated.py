@@ -1,4 +1,4 @@
-"""What the estimation logs say, measured on the validation logs."""
+"""Causes of the estimation logs, measured on the validation logs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from axisight.logs import Log
 
 @dataclass(frozen=True)
 class Validated:
-    """What the estimation logs say, and what it does on the validation logs.
+    """The conclusion of the estimation logs, and its effect on the validation logs.
 
     ``errors``: of the re-fitted simulator on the estimation logs; ``own``: how causes fare on their
     axes, where errors of axes add up.
@@ -42,8 +42,9 @@ def validated(
 ) -> Validated:
     """Measure on the validation logs what the search found.
 
-    Where axes are judged alone, one whose causes do not carry over takes nothing from the others:
-    it loses its own. ``unknown_constants``: axes (from 1) of currents whose torque constant nobody knows.
+    Where errors of axes add up, each axis is judged alone: an axis whose causes do not carry over loses
+    them, and the other axes keep theirs. ``unknown_constants``: axes (from 1) of currents whose torque constant
+    nobody knows.
     """
     errors = refitted_errors(view, found)
     clear = stands_out(errors)
@@ -59,8 +60,8 @@ def validated(
         if own is None or axis is None or len(own.axes) < 2:
             return Validated(found, errors, conclusion.with_checks(lost), reach, own)
         lost.append(
-            f"What explains axis {axis + 1} on the estimation logs does not carry over to the validation "
-            f"logs: it is not among the causes."
+            f"Axis {axis + 1}: the causes that explain it on the estimation logs are left out. That does not carry "
+            "over to the validation logs, where its gap does not shrink."
         )
         found = with_balanced_values(without_axis(found, view.fitter, axis), view.fitter)
 

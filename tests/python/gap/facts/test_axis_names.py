@@ -6,8 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_headline import conclusion
-
 from axisight.gap.facts.axis_names import (
     axis_label,
     own_name,
@@ -16,7 +14,7 @@ from axisight.gap.facts.axis_names import (
     with_joints,
 )
 from axisight.gap.facts.result import AxisVerdict, Interval
-from axisight.gap.verdict.headline import headline
+from axisight.gap.verdict.headline import Facts, headline
 from axisight.report.page import render_report
 from diagnosis_data import explained, gap, of
 
@@ -35,6 +33,7 @@ def test_numbers_are_no_names():
     ("text", "told"),
     [
         ("on axis 3, on axis 3", "on axis 3 (elbow_joint), on axis 3"),
+        ("Axis 3: backlash. Axis 3", "Axis 3 (elbow_joint): backlash. Axis 3"),
         ("on axes 1 and 3.", "on axes 1 (shoulder_pan_joint) and 3 (elbow_joint)."),
         ("axes 1, 2, 3 and 4", "axes 1, 2, 3 and 4"),
         ("3 % on axis 30", "3 % on axis 30"),
@@ -46,10 +45,10 @@ def test_a_joint_stands_behind_the_first_mention_of_its_axis(text, told):
 
 
 def test_an_axis_without_a_gap_is_at_the_floor():
-    assert verdict_word("explained", 1.18, 1.18, 1.15) == "at the floor"
-    assert verdict_word("explained", 1.18, 1.4, 1.15) == "explained"
-    assert verdict_word("explained", 1.18, float("nan"), 1.15) == "explained"
-    assert verdict_word("unknown", 1.18, 1.18, 1.15) == "unknown"
+    assert verdict_word("explained", (1.18, 1.18, 1.18, 1.15)) == "at the floor"
+    assert verdict_word("explained", (1.18, 1.4, 1.18, 1.15)) == "explained"
+    assert verdict_word("explained", (1.18, float("nan"), 1.18, 1.15)) == "explained"
+    assert verdict_word("unknown", (1.18, 1.18, 1.18, 1.15)) == "unknown"
 
 
 def quiet():
@@ -97,15 +96,15 @@ def test_a_gap_within_tolerances_is_said():
         "elbow_joint.mass": Interval(0.03, 0.0076, 0.052),
         "other.mass": Interval(0.09, -0.1, 0.28),
     }
-    text = headline(conclusion("none"), refitted_gap(), (), (), refit=refit, joints=UR)
+    text = headline(Facts("none", refitted_gap(), refit=refit, joints=UR))
     assert text == (
-        "No unmodelled effect found: the gap as given, 21.6 % of the torque on axis 3 (elbow_joint), and above "
-        "the floor on axis 2 (shoulder_lift_joint) too, is within the tolerances of the simulator's own "
-        "parameters. Re-fitted (elbow_joint.mass +3 %), they leave 5.32 % there; sensor noise alone leaves 5.77 %."
+        "No unmodelled effect found. The gap of 21.6 % of the torque on axis 3 (elbow_joint), like that of axis 2 "
+        "(shoulder_lift_joint), lies within the tolerances of the simulator's own parameters. Re-fitted "
+        "(elbow_joint.mass +3 %), they leave 5.32 % there (noise alone: 5.77 %)."
     )
     page = render_report(replace(of("none"), gap=refitted_gap()))
     assert "no larger than noise explains" in page
     assert "re-fitted within their tolerances, remove it" in page
     assert "The measured difference is no larger" not in page
     assert "The measured difference is no larger" in render_report(of("none"))
-    assert "as given" not in headline(conclusion("none"), of("none").gap, (), ())
+    assert "tolerances" not in headline(Facts("none", of("none").gap))

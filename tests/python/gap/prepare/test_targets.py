@@ -125,7 +125,7 @@ def test_what_a_machine_lacks_is_named(robot: Robot, lacks: str) -> None:
     assert found.mode == "closed_loop"
     assert any("No torque was logged" in check for check in found.checks)
     assert found.to_verdict()["gap"]["compared"] == "positions"
-    assert "the gap of positions on held-out data" in found.headline
+    assert "the gap of positions on validation logs" in found.headline
     if lacks == "coulomb_friction@2":
         value = found.causes[0].parameters["coulomb_nm"]
         assert value.value == pytest.approx(2.5, rel=0.1)

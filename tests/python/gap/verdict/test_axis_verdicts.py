@@ -138,7 +138,9 @@ def maps(rng: np.random.Generator, n_axes: int) -> tuple[xr.Dataset, dict[str, x
         )
 
     bands = cells("band", 3)
-    bands = bands.assign_coords(low_hz=("band", list(edges[:-1])), high_hz=("band", list(edges[1:])))
+    bands = bands.assign_coords(
+        low_hz=("band", list(edges[:-1])), high_hz=("band", list(edges[1:]))
+    )
     return bands, {"speed": cells("bin", 4)}
 
 
@@ -149,7 +151,9 @@ def of_arm(arm, axes: tuple[AxisVerdict, ...]) -> Conclusion:
         for a in axes
     ]
     ranking = standings[-1].ranking
-    return Conclusion(arm, (), (), (), None, ranking, 0.0, 0.0, axes, (), standings=tuple(standings))
+    return Conclusion(
+        arm, (), (), (), None, ranking, 0.0, 0.0, axes, (), standings=tuple(standings)
+    )
 
 
 def table(evidence):

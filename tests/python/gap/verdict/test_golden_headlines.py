@@ -23,7 +23,9 @@ def gap(*axes: tuple[float, float, float, float], whole=(0.131, 0.131, 0.077, 0.
     return Gap(*whole, *rows.T)
 
 
-def cause(effect: str, axis: int | None, share: Interval = MUCH, axes=None, **values: float) -> Cause:
+def cause(
+    effect: str, axis: int | None, share: Interval = MUCH, axes=None, **values: float
+) -> Cause:
     found = {k: Interval(v, 0.9 * v, 1.1 * v) for k, v in values.items()}
     units = {k: "Nm" if k.endswith("_nm") else "1" for k in values}
     return Cause(effect, axis, 0.95, found, units, share, axes=axes)

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from axisight.effects import Effect, effect_table, noun, phrase, title
+from axisight.effects import effect_table, noun, phrase, title
+from axisight.gap.facts.axis_names import placed
 from axisight.gap.facts.result import Cause, Interval
-from axisight.gap.verdict.conclusion import Conclusion
-from axisight.gap.verdict.headline import headline, named
+from axisight.gap.verdict.headline import Facts, headline, named
 from axisight.report.wording import plain_name, torque_unit, torque_word
 from diagnosis_data import explained, gap
 
@@ -16,21 +16,6 @@ ONE = Interval(1.0, 1.0, 1.0)
 
 def cause(effect: str, axis: int | None = None) -> Cause:
     return Cause(effect, axis, 0.9, {}, {}, ONE)
-
-
-def conclusion(verdict: str, *rivals: str) -> Conclusion:
-    return Conclusion(
-        verdict=verdict,
-        causes=(),
-        alternatives=(),
-        equivalent=(rivals,) if rivals else (),
-        next_experiment=None,
-        ranking=(),
-        p_none=0.0,
-        p_unknown=0.0,
-        axes=(),
-        checks=(),
-    )
 
 
 @pytest.mark.parametrize(
@@ -53,18 +38,37 @@ def test_an_effect_has_its_article_and_capitals(effect, words):
 
 
 @pytest.mark.parametrize("verdict", ["none", "unknown", "explained", "undecidable"])
-@pytest.mark.parametrize("causes", [[], [cause("payload")]])
+@pytest.mark.parametrize("causes", [(), (cause("payload"),)])
 def test_positions_have_a_gap_of_their_own(verdict, causes):
     if verdict in ("explained", "undecidable") and not causes:
         return
-    of = gap(0.3, 0.3, 0.06, 0.05, 3)
-    rivals = ["payload", "link_mass@2"] if verdict == "undecidable" else []
-    by_torque = headline(conclusion(verdict, *rivals), of, causes, ())
-    positions = replace(of, compared="positions")
-    text = headline(conclusion(verdict, *rivals), positions, causes, ())
+    rivals = (("payload", "link_mass@2"),) if verdict == "undecidable" else ()
+    facts = Facts(verdict, gap(0.3, 0.3, 0.06, 0.05, 3), (), causes, rivals)
+    by_torque = headline(facts)
+    text = headline(replace(facts, gap=replace(facts.gap, compared="positions")))
     assert "of the torque" in by_torque
     expected = by_torque.replace("of the torque", "of the commanded torque")
-    assert text == expected.replace("the gap on", "the gap of positions on")
+    for before, after in (
+        ("gap on", "gap of positions on"),
+        ("the gap of 30", "the gap of positions of 30"),
+    ):
+        expected = expected.replace(before, after)
+    assert text == expected
+
+
+@pytest.mark.parametrize(
+    ("label", "words"),
+    [
+        ("backlash@2", "backlash on axis 2"),
+        ("payload", "a payload"),
+        ("axis_coupling@5,6", "axis coupling on axes 5 and 6"),
+        ("torque_constant@2", "another torque constant on axis 2"),
+        ("link_com@1", "another link centre of mass on axis 1"),
+        ("gravity_compensation@3", "gravity compensation on axis 3"),
+    ],
+)
+def test_labels_in_words(label, words):
+    assert placed(label) == words
 
 
 def test_torques_from_positions_say_so():
@@ -106,28 +110,4 @@ def test_every_effect_can_stand_in_a_sentence(name):
     ],
 )
 def test_causes_are_grouped(causes, words):
-    assert named(causes, (), 6) == words
-
-
-def test_what_the_simulator_has_already_has_other_values():
-    own = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5})
-    words = named([cause("coulomb_friction", 1)], (own,), 1)
-    assert words == "the machine's values of Coulomb friction on axis 1"
-
-
-def test_the_headline_says_it_lacks_a_payload():
-    text = headline(conclusion("explained"), gap(0.3, 0.3, 0.06, 0.05, 3), [cause("payload")], ())
-    assert text.startswith("The simulator lacks a payload: adding it shrinks the gap")
-
-
-def test_rivals_are_named_in_words():
-    rivals = ("torque_constant@2", "payload")
-    text = headline(
-        conclusion("undecidable", *rivals),
-        gap(0.3, 0.3, 0.06, 0.05, 3),
-        [cause("torque_constant", 2)],
-        (),
-    )
-    assert text.startswith(
-        "This data cannot tell the machine's torque constant on axis 2 and a payload apart"
-    )
+    assert named(causes, 6) == words

@@ -96,9 +96,10 @@ def _other_columns(log: Log, axis: _Axis) -> list[Finding]:
         Finding(
             "axes_swapped",
             "refuse",
-            f"expected the {field.replace('_', ' ')} of axis {i + 1}, got that of axis {source + 1}: "
-            f"with it the controller of the robot file explains {100 * axis.best.explained:.3g} % of "
-            f"the torque, as given {100 * max(axis.as_given.explained, 0):.3g} %; exchange the columns",
+            f"expected the {field.replace('_', ' ')} of axis {i + 1}, got that of axis {source + 1}. With the "
+            "columns exchanged the controller of the robot file explains "
+            f"{100 * axis.best.explained:.3g} % of the torque, as given "
+            f"{100 * max(axis.as_given.explained, 0):.3g} %. Exchange them",
             log.name,
             i + 1,
             _column(field, i),
@@ -140,8 +141,8 @@ def _within(x: float, limits: tuple[float, float]) -> bool:
 def _wrong(log: Log, i: int, field: str, factor: float, ratio: float) -> Finding:
     if factor < 0.0 and _within(-factor, _SAME_GAINS):
         message = (
-            f"expected the sign of the robot's axis, got the other one (factor {factor:.4g} by the "
-            "controller's law): turn it round"
+            f"expected the sign of the robot's axis, got the other sign (factor {factor:.4g} by the controller's "
+            "law). Change the sign of this column"
         )
         return Finding("sign_flipped", "refuse", message, log.name, i + 1, _column(field, i))
     return _scaled(log, i, field, factor, ratio, severity="refuse")
@@ -152,16 +153,16 @@ def _scaled(
 ) -> Finding:
     name = scale_name(field, factor, ratio)
     message = (
-        f"expected SI units, got numbers {factor:.4g} times what the controller of the robot file "
-        f"makes of the other channels: {_advice(name)}"
+        f"expected SI units, got numbers {factor:.4g} times those that the controller of the robot file gives for "
+        f"the other channels. {_advice(name)}"
     )
     return Finding(name, severity, message, log.name, i + 1, _column(field, i))
 
 
 def _advice(name: str) -> str:
     if name.endswith("_scaled"):
-        return "state the unit and scale in a column map, or the gains in the robot file"
-    return "state the unit in a column map"
+        return "State the unit and scale in a column map, or the gains in the robot file"
+    return "State the unit in a column map"
 
 
 def _shifted(log: Log, axis: _Axis, shifts: list[Shift | None]) -> list[Finding]:
@@ -173,10 +174,9 @@ def _shifted(log: Log, axis: _Axis, shifts: list[Shift | None]) -> list[Finding]
     words = shift.field.replace("_", " ")
     late = "late" if shift.seconds > 0 else "early"
     message = (
-        f"expected channels of one clock, got the {words} {abs(shift.seconds) * 1e3:.4g} ms {late} "
-        f"against the others (the controller's law then explains {100 * shift.fit.explained:.4g} % of the "
-        f"torque, as given {100 * max(axis.as_given.explained, 0):.3g} %): shift it back, or record on "
-        "one clock"
+        f"expected channels of one clock, got the {words} {abs(shift.seconds) * 1e3:.4g} ms {late} against the "
+        f"others. Shifted, the controller's law explains {100 * shift.fit.explained:.4g} % of the torque, as given "
+        f"{100 * max(axis.as_given.explained, 0):.3g} %. Shift it back, or record on one clock"
     )
     column = _column(shift.field, axis.index)
     # On a smooth motion, of which nearly all is explained as given, other gains look like a shift.
@@ -187,9 +187,9 @@ def _shifted(log: Log, axis: _Axis, shifts: list[Shift | None]) -> list[Finding]
 
 def _off(log: Log, axis: _Axis) -> Finding:
     message = (
-        f"expected what the controller of the robot file gives, got a torque of which it explains "
-        f"{100 * max(axis.as_given.explained, 0):.3g} %: other kind or gains of the controller, a feed-forward, "
-        "another torque than the command, or channels of different times"
+        "expected the torque that the controller of the robot file commands, got a torque of which it explains "
+        f"{100 * max(axis.as_given.explained, 0):.3g} %. Check kind and gains of the controller, a feed-forward, "
+        "whether the column is the command, and the times of the channels"
     )
     column = _column("torque", axis.index)
     return Finding("torque_off_control_law", "flag", message, log.name, axis.index + 1, column)

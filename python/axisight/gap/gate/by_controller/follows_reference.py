@@ -65,8 +65,8 @@ def _left(log: Log, reference: Array) -> Array:
 
 def _other(log: Log, i: int, other: int) -> Finding:
     message = (
-        f"expected a position that follows the reference of axis {i + 1}, got one that follows that of "
-        f"axis {other + 1}, and the other way round: exchange the columns of positions or references"
+        f"expected a position that follows the reference of axis {i + 1}, got one that follows that of axis "
+        f"{other + 1}, and the other way round. Exchange the columns of positions or of references"
     )
     return Finding("axes_swapped", "refuse", message, log.name, i + 1, f"position_{i + 1}")
 
@@ -75,8 +75,8 @@ def _factor(robot: Robot, log: Log, i: int, ratio: float) -> list[Finding]:
     column = f"position_{i + 1}"
     if -_SIZE[1] < ratio < -_SIZE[0]:
         message = (
-            f"expected a position that follows its reference, got one that runs against it (factor "
-            f"{ratio:.4g}): turn position or reference round"
+            f"expected a position that follows its reference, got one that moves against it (factor {ratio:.4g}). "
+            "Change the sign of the position or of the reference"
         )
         return [Finding("sign_flipped", "refuse", message, log.name, i + 1, column)]
     gear = float(robot.gear_ratio[i])
@@ -85,7 +85,7 @@ def _factor(robot: Robot, log: Log, i: int, ratio: float) -> list[Finding]:
     if name.endswith("_scaled") and not position.endswith("_scaled"):
         name = position
     message = (
-        f"expected a reference equal to the derivative of the position, got one {ratio:.4g} times as "
-        "large: state units and gear in a column map"
+        f"expected a reference equal to the derivative of the position, got one {ratio:.4g} times as large. State "
+        "units and gear in a column map"
     )
     return [Finding(name, "refuse", message, log.name, i + 1, column)]

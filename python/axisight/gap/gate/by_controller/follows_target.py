@@ -64,15 +64,16 @@ def _size(position: Array, target: Array, lag: int) -> float:
 
 def _other(log: Log, i: int, other: int) -> Finding:
     message = (
-        f"expected a position that follows the target of axis {i + 1}, got one that follows that of "
-        f"axis {other + 1}, and the other way round: exchange the columns of positions or targets"
+        f"expected a position that follows the target of axis {i + 1}, got one that follows that of axis "
+        f"{other + 1}, and the other way round. Exchange the columns of positions or of targets"
     )
     return Finding("axes_swapped", "refuse", message, log.name, i + 1, f"position_{i + 1}")
 
 
 def _against(log: Log, i: int) -> Finding:
     message = (
-        "expected a position that follows its target, got one that runs against it: turn one round"
+        "expected a position that follows its target, got one that moves against it. Change the sign of the "
+        "position or of the target"
     )
     return Finding("sign_flipped", "refuse", message, log.name, i + 1, f"position_{i + 1}")
 
@@ -80,7 +81,7 @@ def _against(log: Log, i: int) -> Finding:
 def _factor(robot: Robot, log: Log, i: int, ratio: float) -> Finding:
     name = scale_name("position", ratio, float(robot.gear_ratio[i]))
     message = (
-        f"expected a position of the size of its target, got one {ratio:.4g} times as large: state units "
-        "and gear of both in a column map"
+        f"expected a position of the size of its target, got one {ratio:.4g} times as large. State units and gear "
+        "of both in a column map"
     )
     return Finding(name, "refuse", message, log.name, i + 1, f"position_{i + 1}")

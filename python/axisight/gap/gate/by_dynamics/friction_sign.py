@@ -32,8 +32,8 @@ def check_passive(robot: Robot, log: Log, at: Motion) -> list[Finding]:
     out = []
     for axis in np.flatnonzero(share < _DRIVES).tolist():
         message = (
-            f"expected friction that takes energy, got one that drives ({100 * share[axis]:.3g} % of the "
-            "work done): turn the torque or the position of the axis round"
+            f"expected friction that brakes, got friction that drives the axis ({100 * share[axis]:.3g} % of the "
+            "work done). Change the sign of its torque or of its position"
         )
         column = f"torque_cmd_{axis + 1}"
         out.append(Finding("sign_flipped", "refuse", message, log.name, axis + 1, column))

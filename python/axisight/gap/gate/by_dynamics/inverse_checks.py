@@ -80,7 +80,8 @@ def _too_fast(robot: Robot, log: Log, at: Motion) -> list[Finding]:
         top = float(np.abs(at[1][:, axis]).max())
         if top > _FASTEST_RAD_S and not slides:
             message = (
-                f"expected a motor position in rad, got up to {top:.3g} rad/s: encoder counts?"
+                f"expected a motor position in rad, got speeds up to {top:.3g} rad/s. Are these encoder counts? "
+                "State the unit in a column map"
             )
             column = f"position_{axis + 1}"
             out.append(Finding("position_in_counts", "refuse", message, log.name, axis + 1, column))
@@ -119,9 +120,10 @@ def _in_scale(fit: TorqueFit) -> bool:
 def _named(log: Log, found: Mistake, given: TorqueFit) -> Finding:
     axes = ", ".join(str(i + 1) for i in found.axes)
     message = (
-        f"expected motions that explain the torques, got ones that leave "
-        f"{100 * given.total / len(given.left):.3g} % of their variance; after one change ({found.words}) "
-        f"{100 * found.fit.total / len(given.left):.3g} %"
+        "expected motions that explain the torques, got motions that leave "
+        f"{100 * given.total / len(given.left):.3g} % of the variance of the torque. After one change "
+        f"({found.words}) they leave {100 * found.fit.total / len(given.left):.3g} %. Make that change in the log "
+        "or in its column map"
     )
     axis = found.axes[0] + 1 if len(found.axes) < len(given.left) else None
     whole = found.field == "gravity"
@@ -143,8 +145,8 @@ def _scales(robot: Robot, log: Log, given: TorqueFit) -> list[Finding]:
         a_unit = not (_ONE_AXIS[0] < slope < _ONE_AXIS[1] or name.endswith("_scaled"))
         severity: GateSeverity = "refuse" if everywhere or a_unit else "flag"
         message = (
-            f"expected Nm on the motor side, got numbers {slope:.4g} times the predicted torque: state "
-            "unit, scale and side of the gear in a column map, or masses and counterbalance in the robot file"
+            f"expected Nm on the motor side, got numbers {slope:.4g} times the predicted torque. State unit, "
+            "scale and side of the gear in a column map, or masses and counterbalance in the robot file"
         )
         column = f"torque_cmd_{axis + 1}"
         out.append(Finding(name, severity, message, log.name, axis + 1, column))

@@ -187,17 +187,17 @@ def _finding(name: tuple[str, int], size: float, share: float) -> Finding | None
         if abs(size) < _LEAST_RAD:
             return None
         message = (
-            f"expected positions from the robot's zero, got ones that look {size:.3g} rad (joint side) "
-            f"off: it explains {100 * share:.3g} % of what is left; check the zero mark, or the load "
-            "of the robot file"
+            f"expected positions from the robot's zero, got positions that seem {size:.3g} rad (joint side) off. "
+            f"That offset explains {100 * share:.3g} % of the remaining error. Check the zero mark, or the load in "
+            "the robot file"
         )
         return Finding(kind, severity, message, None, axis + 1, f"position_{axis + 1}")
     if abs(size) < _LEAST_S:
         return None
     who = "torques" if axis < 0 else f"the columns of axis {axis + 1}"
     message = (
-        f"expected channels of one clock, got {who} that look {1e3 * size:.3g} ms late against the "
-        f"other channels: it explains {100 * share:.3g} % of what is left; record on one clock"
+        f"expected channels of one clock, got {who} that seem {1e3 * size:.3g} ms late against the others. That "
+        f"delay explains {100 * share:.3g} % of the remaining error. Record on one clock"
     )
     field = "torque_cmd" if axis < 0 else f"position_{axis + 1}"
     return Finding(kind, severity, message, None, axis + 1 or None, field)

@@ -56,8 +56,8 @@ def _explains(given: TorqueFit, turned: TorqueFit) -> bool:
 
 def _named(axis: int, log: Log, given: TorqueFit, turned: TorqueFit) -> Finding:
     message = (
-        f"expected motions that explain the torques, got ones that leave {100 * given.left.mean():.3g} % of their "
-        f"variance ({log.name}), {100 * turned.left.mean():.3g} % with axis {axis + 1} turned the other way: "
-        f"gear_ratio of axis {axis + 1} times -1, or its axis in the robot file"
+        f"expected motions that explain the torques, got motions that leave {100 * given.left.mean():.3g} % of "
+        f"their variance ({log.name}), and {100 * turned.left.mean():.3g} % with axis {axis + 1} turned the other "
+        f"way. Multiply gear_ratio of axis {axis + 1} by -1, or turn its axis in the robot file"
     )
     return Finding("axis_turned", "refuse", message, None, axis + 1, "gear_ratio")

@@ -63,7 +63,7 @@ def undone(robot: Robot, at: Motion) -> Iterator[Mistake]:
     for i in range(n):
         sign = np.ones(n)
         sign[i] = -1.0
-        words = f"turn axis {i + 1} round"
+        words = f"change the sign of axis {i + 1}"
         turned = torque_fit(torque * sign, given, at)
         yield Mistake("sign_flipped", "torque_cmd", (i,), words, turned)
         yield Mistake("sign_flipped", "position", (i,), words, moved(sign))
@@ -73,7 +73,9 @@ def undone(robot: Robot, at: Motion) -> Iterator[Mistake]:
     if np.any(np.abs(np.log(np.abs(robot.gear_ratio))) > _GEARED):
         words = "divide by the gear ratios"
         yield Mistake("position_joint_side", "position", every, words, moved(1 / robot.gear_ratio))
-    yield Mistake("gravity_flipped", "gravity", every, "turn it round", gravity_turned(robot, at))
+    yield Mistake(
+        "gravity_flipped", "gravity", every, "change the sign of gravity", gravity_turned(robot, at)
+    )
 
 
 def predict(robot: Robot, at: Motion) -> Array:
