@@ -74,7 +74,7 @@ def main(place: Path) -> None:
         if "diagnose" not in timed("axisight --help", [axisight, "--help"], folder):
             raise SystemExit("axisight --help: expected its commands")
         told = timed("axisight demo", [axisight, "demo"], folder)
-        if "explained: Axis 2: the simulator lacks Coulomb friction" not in told:
+        if "explained: The simulator lacks Coulomb friction on axis 2" not in told:
             raise SystemExit(f"axisight demo: expected friction on axis 2, got\n{told}")
         if not (folder / "demo" / "report.html").stat().st_size:
             raise SystemExit("axisight demo: expected a report")

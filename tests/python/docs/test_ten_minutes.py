@@ -99,7 +99,7 @@ def test_a_urdf_and_csv(
     said(guess)
     said(check)
     answer = said(diagnose)
-    assert "explained: Axis 2: the simulator lacks Coulomb friction" in answer
+    assert "explained: The simulator lacks Coulomb friction on axis 2" in answer
     assert "compared: by inverse dynamics, below" in answer
     assert re.search(r'<dynamics damping="0.5" friction="[12]\.', Path("new.urdf").read_text())
     assert Path("verdict.json").exists()
@@ -119,7 +119,7 @@ def test_recordings_of_ros(
         back = [np.ascontiguousarray(x[:, ::-1]) for x in fields]
         written_states(Path(f"bag{run}"), "rosbag2", time, list(JOINTS)[::-1], back)
     (diagnose,) = commands["Recordings of ROS"]
-    assert "explained: Axis 2: the simulator lacks Coulomb friction" in said(diagnose)
+    assert "explained: The simulator lacks Coulomb friction on axis 2" in said(diagnose)
 
 
 def test_an_mjcf_with_targets(
@@ -138,9 +138,9 @@ def test_an_mjcf_with_targets(
                 table[f"position_{i + 1}"] = log.position_rad[:, i]
             pd.DataFrame(table).to_parquet(f"{name}{run}.parquet")
     (diagnose,) = commands["MJCF, targets and positions"]
-    assert "explained: Axis 2: the simulator lacks Coulomb friction" in said(diagnose)
+    assert "explained: The simulator lacks Coulomb friction on axis 2" in said(diagnose)
     assert 'frictionloss="2.' in Path("new.xml").read_text()
     own = "".join(f" --simulated sim{run}.parquet" for run in (1, 2, 3))
     answer = said(diagnose.partition(" --write-model")[0] + own)
     assert "The model differs from your simulator by axis 1: 0." in answer
-    assert "explained: Axis 2: the simulator lacks Coulomb friction" in answer
+    assert "explained: The simulator lacks Coulomb friction on axis 2" in answer

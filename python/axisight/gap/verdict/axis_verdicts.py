@@ -19,7 +19,8 @@ An axis has a gap where one of these holds:
 | the residual of the estimation logs has an excess, and the validation logs a gap | 0.3; 10 % above the floor |
 | the same excess is too large for noise of another colour, by inverse dynamics | 1.0 |
 
-Excess is that of `AxisVerdict`; 0.3 is ``Settings.largest_scatter``. In a closed loop the residual of one axis shows on the others, so the last row needs inverse dynamics.
+Excess is that of `AxisVerdict`; 0.3 is ``Settings.largest_scatter``. In a closed loop the residual of one axis
+shows on the others, so the last row needs inverse dynamics.
 """
 
 from __future__ import annotations

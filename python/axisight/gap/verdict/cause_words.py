@@ -33,27 +33,15 @@ def named(causes: Sequence[Cause], n_axes: int = 0) -> str:
 
 
 def sure(causes: Sequence[Cause], own: Sequence[Effect], n_axes: int) -> str:
-    """Return a sentence about causes, ``Axis 2: the simulator lacks backlash.`` where all are of one place.
+    """Return what the simulator lacks, then what it has with a wrong value, in a sentence each.
 
-    ``own``: effects of the simulator. What it has with another value is wrong, and not lacking.
+    ``own``: effects of the simulator. An effect that it has with another value is wrong, and not lacking.
     """
     wrong = [c for c in in_order(causes) if _is_wrong(c, own)]
     lacking = [c for c in in_order(causes) if c not in wrong]
-    places = {axes_of(c) for c in causes}
-    if len(places) == 1:
-        (where,) = places
-        parts = [f"the simulator lacks {named(_anywhere(lacking))}"] if lacking else []
-        parts += [f"the {x}" for x in _wrong(wrong, own, told_place=False)]
-        text = listed(parts)
-        lead = place(where, n_axes)
-        return (
-            f"{lead[:1].upper()}{lead[1:]}: {text}." if lead else f"{text[:1].upper()}{text[1:]}."
-        )
     out = [f"The simulator lacks {named(lacking, n_axes)}."] if lacking else []
     if wrong:
-        text = listed(
-            _told([f"the {x}" for x in _wrong(wrong, own, told_place=True, n_axes=n_axes)])
-        )
+        text = listed(_told(_wrong(wrong, own, n_axes)))
         out.append(f"{text[:1].upper()}{text[1:]}.")
     return " ".join(out)
 
@@ -65,7 +53,7 @@ def deed(
     wrong = [_is_wrong(c, own) for c in causes]
     verb = "Correcting" if all(wrong) else "Changing" if any(wrong) else "Adding"
     if len(causes) < len(every):
-        return f"{verb} {named(_anywhere(causes) if len({axes_of(c) for c in every}) == 1 else causes, n_axes)}"
+        return f"{verb} {named(causes, n_axes)}"
     return f"{verb} {'it' if len(causes) == 1 else 'them'}"
 
 
@@ -94,10 +82,6 @@ def _of_simulator(cause: Cause, own: Sequence[Effect]) -> Effect | None:
     return next(same, None)
 
 
-def _anywhere(causes: Sequence[Cause]) -> list[Cause]:
-    return [Cause(c.effect, None, c.probability, {}, {}, c.gap_reduction) for c in causes]
-
-
 def _told(phrases: Sequence[str]) -> list[str]:
     """Return phrases as far as a sentence bears them."""
     if len(phrases) <= _MOST:
@@ -118,32 +102,32 @@ def _phrases(causes: Sequence[Cause], n_axes: int) -> list[str]:
         shared = noun(effect) if start else head
         key = (start, shared, tuple(mine))
         phrases.setdefault(key, []).append(adjective if shared == head else "")
-    return [
-        " ".join(x for x in (start, listed(adjectives), head, _on(where, n_axes)) if x)
-        for (start, head, where), adjectives in phrases.items()
-    ]
+    places: dict[tuple[int, ...], list[str]] = {}
+    for (start, head, where), adjectives in phrases.items():
+        text = " ".join(x for x in (start, listed(adjectives), head) if x)
+        places.setdefault(where, []).append(text)
+    return [f"{listed(texts)} {_on(where, n_axes)}".strip() for where, texts in places.items()]
 
 
 def _on(axes: Sequence[int], n_axes: int) -> str:
     return f"on {place(axes, n_axes)}" if axes else ""
 
 
-def _wrong(
-    causes: Sequence[Cause], own: Sequence[Effect], *, told_place: bool, n_axes: int = 0
-) -> list[str]:
-    """Return a phrase an effect that the simulator has with a wrong value: "motor inertia of the simulator is wrong".
+def _wrong(causes: Sequence[Cause], own: Sequence[Effect], n_axes: int) -> list[str]:
+    """Return a phrase for each effect with a wrong value: "the motor inertia of axis 3 is wrong in the simulator".
 
-    The machine's value stands behind it where an effect is one number on few axes.
+    The machine's value stands behind it where the effect is one number on few axes.
     """
     out = []
     for effect in dict.fromkeys(c.effect for c in causes):
         mine = [c for c in causes if c.effect == effect]
-        where = place([a for c in mine for a in axes_of(c)], n_axes) if told_place else ""
+        where = place([a for c in mine for a in axes_of(c)], n_axes)
         numbers = [text for c in mine if (text := _of_machine(c, _of_simulator(c, own)))]
         told = 0 < len(numbers) == len(mine) <= _NUMBERED
         machine = f" (machine: {listed(numbers)})" if told else ""
-        at = f" of {where}" if where else ""
-        out.append(f"{noun(effect)}{at} in the simulator is wrong{machine}")
+        out.append(
+            f"the {noun(effect)}{f' of {where}' if where else ''} is wrong in the simulator{machine}"
+        )
     return out
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from axisight.gap.facts.axis_names import (
     axis_label,
     own_name,

@@ -67,7 +67,7 @@ def test_steps_are_named_beside_another_cause(logs):
     # Each takes its own part of the gap.
     assert said.causes[0].gap_reduction.value > 0.9
     assert said.axes[0].causes == (0, 1)
-    assert "Adding Coulomb friction cuts" in said.headline
+    assert "Adding Coulomb friction on axis 1 cuts" in said.headline
 
 
 def in_motion(logs):

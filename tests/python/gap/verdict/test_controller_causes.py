@@ -96,7 +96,7 @@ def test_other_gains_stand_behind_what_the_motion_lacks():
     assert [c.label for c in said.causes] == ["coulomb_friction@1", "controller_gain@1"]
     assert said.causes[0].gap_reduction.value > 0.9
     assert said.causes[1].gap_reduction.high == 0.0
-    assert "Adding Coulomb friction cuts" in said.headline
+    assert "Adding Coulomb friction on axis 1 cuts" in said.headline
 
 
 def test_a_torque_reported_too_large_is_one_cause():

@@ -58,17 +58,17 @@ PAIR = Facts(
 SITUATIONS: dict[str, tuple[Facts, str]] = {
     "one cause": (
         ONE,
-        "Axis 2 (shoulder): the simulator lacks Coulomb friction. Adding it cuts the gap on validation logs from "
+        "The simulator lacks Coulomb friction on axis 2 (shoulder). Adding it cuts the gap on validation logs from "
         "13.1 % to 7.7 % of the torque (noise alone: 7.8 %).",
     ),
     "an arm without names of its own": (
         replace(ONE, joints=("axis1", "axis2")),
-        "Axis 2: the simulator lacks Coulomb friction. Adding it cuts the gap on validation logs from "
-        "13.1 % to 7.7 % of the torque (noise alone: 7.8 %).",
+        "The simulator lacks Coulomb friction on axis 2. Adding it cuts the gap on validation logs from 13.1 % to "
+        "7.7 % of the torque (noise alone: 7.8 %).",
     ),
     "two causes on one axis": (
         replace(ONE, causes=(COULOMB, cause("backlash", 2))),
-        "Axis 2 (shoulder): the simulator lacks Coulomb friction and backlash. Adding them cuts the gap on "
+        "The simulator lacks Coulomb friction and backlash on axis 2 (shoulder). Adding them cuts the gap on "
         "validation logs from 13.1 % to 7.7 % of the torque (noise alone: 7.8 %).",
     ),
     "two causes on two axes": (
@@ -98,7 +98,7 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
     ),
     "an effect between two axes": (
         replace(ONE, causes=(cause("axis_coupling", 5, axes=(5, 6)),)),
-        "Axes 5 (wrist_2) and 6 (wrist_3): the simulator lacks axis coupling. Adding it cuts the gap on "
+        "The simulator lacks axis coupling on axes 5 (wrist_2) and 6 (wrist_3). Adding it cuts the gap on "
         "validation logs from 13.1 % to 7.7 % of the torque (noise alone: 7.8 %).",
     ),
     "a cause of the whole arm, some gap left": (
@@ -115,8 +115,8 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
     ),
     "a wrong value": (
         replace(ONE, causes=(cause("motor_inertia", 3, relative_change=0.45),)),
-        "Axis 3 (elbow): the motor inertia in the simulator is wrong (machine: +45 %). Correcting it cuts the gap "
-        "on validation logs from 13.1 % to 7.7 % of the torque (noise alone: 7.8 %).",
+        "The motor inertia of axis 3 (elbow) is wrong in the simulator (machine: +45 %). Correcting it cuts the gap"
+        " on validation logs from 13.1 % to 7.7 % of the torque (noise alone: 7.8 %).",
     ),
     "an effect of the simulator with another value": (
         replace(
@@ -124,14 +124,14 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
             causes=(cause("viscous_friction", 2, viscous_nm_s_rad=0.61),),
             own=(Effect("viscous_friction", 2, {"viscous_nm_s_rad": 0.5}),),
         ),
-        "Axis 2 (shoulder): the viscous friction in the simulator is wrong (machine: 0.61, simulator: 0.5). "
+        "The viscous friction of axis 2 (shoulder) is wrong in the simulator (machine: 0.61, simulator: 0.5). "
         "Correcting it cuts the gap on validation logs from 13.1 % to 7.7 % of the torque (noise alone: 7.8 %).",
     ),
     "an effect that lacks and a wrong value": (
         replace(ONE, causes=(COULOMB, cause("joint_stiffness", 3, relative_change=-0.2))),
-        "The simulator lacks Coulomb friction on axis 2 (shoulder). The joint stiffness of axis 3 (elbow) in the "
-        "simulator is wrong (machine: -20 %). Changing them cuts the gap on validation logs from 13.1 % to 7.7 % "
-        "of the torque (noise alone: 7.8 %).",
+        "The simulator lacks Coulomb friction on axis 2 (shoulder). The joint stiffness of axis 3 (elbow) is wrong "
+        "in the simulator (machine: -20 %). Changing them cuts the gap on validation logs from 13.1 % to 7.7 % of "
+        "the torque (noise alone: 7.8 %).",
     ),
     "equivalents that give the same logs": (
         replace(
@@ -139,13 +139,13 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
             causes=(cause("torque_offset", 2),),
             twins=(("torque_offset@2", "torque_sensor_offset@2"),),
         ),
-        "Axis 2 (shoulder): the simulator lacks a torque offset. Adding it cuts the gap on validation logs from "
+        "The simulator lacks a torque offset on axis 2 (shoulder). Adding it cuts the gap on validation logs from "
         "13.1 % to 7.7 % of the torque (noise alone: 7.8 %). A torque sensor offset on axis 2 would give the same "
         "logs as a torque offset on axis 2.",
     ),
     "undecidable beside a sure cause": (
         PAIR,
-        "Axis 1 (pan): the simulator lacks Coulomb friction. Open: another link mass on axis 1 or a payload. "
+        "The simulator lacks Coulomb friction on axis 1 (pan). Open: another link mass on axis 1 or a payload. "
         "These logs cannot tell them apart. With the first of them the gap on validation logs goes from 91.3 % to "
         "3.9 % of the torque (noise alone: 3.5 %).",
     ),
@@ -185,9 +185,9 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
             axes=axes(a2="explained", a4="unknown"),
             causes=(COULOMB,),
         ),
-        "Axis 2 (shoulder): the simulator lacks Coulomb friction. Adding it takes the gap of axis 2 from "
-        "40 % to 6 % (noise alone: 5 %). Axis 4 (wrist_1) has a gap that no known effect explains: 77 % of the "
-        "torque (noise alone: 1.4 %), mostly at 0.5-6 Hz (speed: slow).",
+        "The simulator lacks Coulomb friction on axis 2 (shoulder). Adding it takes the gap of axis 2 from 40 % to "
+        "6 % (noise alone: 5 %). Axis 4 (wrist_1) has a gap that no known effect explains: 77 % of the torque "
+        "(noise alone: 1.4 %), mostly at 0.5-6 Hz (speed: slow).",
     ),
     "unknown on three axes": (
         replace(
@@ -261,12 +261,12 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
     ),
     "position targets": (
         replace(ONE, gap=replace(gap(), compared="positions")),
-        "Axis 2 (shoulder): the simulator lacks Coulomb friction. Adding it cuts the gap of positions on validation "
-        "logs from 13.1 % to 7.7 % of the commanded torque (noise alone: 7.8 %).",
+        "The simulator lacks Coulomb friction on axis 2 (shoulder). Adding it cuts the gap of positions on "
+        "validation logs from 13.1 % to 7.7 % of the commanded torque (noise alone: 7.8 %).",
     ),
     "a cause of the controller alone": (
         replace(ONE, causes=(cause("controller_gain", 2, NOTHING),)),
-        "Axis 2 (shoulder): the controller gain in the simulator is wrong. A torque predicted from the measured "
+        "The controller gain of axis 2 (shoulder) is wrong in the simulator. A torque predicted from the measured "
         "motion does not feel this. The gap is 13.1 % of the torque (noise alone: 7.8 %).",
     ),
     "a cause beside one of the controller": (
@@ -277,13 +277,14 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
     ),
     "steps of an encoder": (
         replace(ONE, causes=(cause("position_quantization", 2),)),
-        "Axis 2 (shoulder): the simulator lacks position quantization. The steps of the encoders set the floor: the "
-        "gap is 13.1 % of the torque (noise and steps: 7.8 %).",
+        "The simulator lacks position quantization on axis 2 (shoulder). The steps of the encoders set the floor: "
+        "the gap is 13.1 % of the torque (noise and steps: 7.8 %).",
     ),
     "steps of an encoder beside a cause": (
         replace(ONE, causes=(COULOMB, cause("position_quantization", 2))),
-        "Axis 2 (shoulder): the simulator lacks Coulomb friction and position quantization. Adding Coulomb friction "
-        "cuts the gap on validation logs from 13.1 % to 7.7 % of the torque (noise and steps alone: 7.8 %).",
+        "The simulator lacks Coulomb friction and position quantization on axis 2 (shoulder). Adding Coulomb "
+        "friction on axis 2 cuts the gap on validation logs from 13.1 % to 7.7 % of the torque (noise and steps "
+        "alone: 7.8 %).",
     ),
     "a simulation that broke off": (
         replace(
