@@ -1,4 +1,4 @@
-"""What docs/black_box.md, identifiability.md and robot_files.md show runs and does what they say."""
+"""What docs/black_box.md, identifiability.md and pages of robot files show runs and does what they say."""
 
 import inspect
 import re
@@ -45,9 +45,13 @@ def test_identifiability_page(repository: Path, tmp_path: Path) -> None:
 
 
 def test_robot_files_page(repository: Path, tmp_path: Path) -> None:
-    shown = run(repository, tmp_path, "robot_files.md")
+    assert run(repository, tmp_path, "robot_files.md")["wide"].tolerances["stiffness"] == 0.05
+
+
+def test_identified_values_page(repository: Path, tmp_path: Path) -> None:
+    shown = run(repository, tmp_path, "identified_values.md")
     assert shown["back"].value("axis1.stiffness") == 1.482e6
-    page = (repository / "docs" / "robot_files.md").read_text(encoding="utf-8")
+    page = (repository / "docs" / "identified_values.md").read_text(encoding="utf-8")
     quoted = re.search(r"`(# identified: axis1\.stiffness[^`]*)`", page)
     assert quoted and quoted.group(1) in (tmp_path / "axis1.toml").read_text()
     files = {"axis1.toml", "axis1.identified.json", "axis.toml", "axis.identified.json"}

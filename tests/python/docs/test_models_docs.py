@@ -1,4 +1,4 @@
-"""What docs/models.md shows runs, and prints what the page says."""
+"""What docs/models.md and docs/mujoco.md show runs, and prints what the pages say."""
 
 import re
 from pathlib import Path
@@ -15,8 +15,9 @@ def page(repository: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def blocks(page: str) -> list[str]:
-    return re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+def blocks(repository: Path, page: str) -> list[str]:
+    text = page + (repository / "docs" / "mujoco.md").read_text(encoding="utf-8")
+    return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
 
 
 def run(text: str, capsys: pytest.CaptureFixture) -> None:

@@ -1,4 +1,4 @@
-"""What docs/logs.md shows runs, and does what the page says."""
+"""What docs/logs.md and docs/cases.md show runs, and does what the pages say."""
 
 import re
 from pathlib import Path
@@ -28,6 +28,11 @@ def page(repository: Path) -> str:
     return (repository / "docs" / "logs.md").read_text(encoding="utf-8")
 
 
+@pytest.fixture
+def cases(repository: Path) -> str:
+    return (repository / "docs" / "cases.md").read_text(encoding="utf-8")
+
+
 def test_the_examples(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}
@@ -42,6 +47,12 @@ def test_the_examples(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert [a.velocity.unit for a in guess.axis] == ["rpm", "rpm"]
     assert '# torque = { name = "i_2", unit = "A", scale = ... }' in names["guess"].text
     assert np.isfinite(names["log"].torque_nm).all()
+
+
+def test_the_case(cases: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec("\n".join(re.findall(r"```python\n(.*?)```", cases, flags=re.DOTALL)), names)
     case = names["case"]
     assert case.roles == ("estimation", "validation")
     assert case.estimation[0].period_s == 10.0
@@ -75,7 +86,7 @@ def test_the_table_has_every_key_of_a_map(page: str) -> None:
     assert units <= set(re.findall(r"`([^`\n]+)`", maps))
 
 
-def test_the_table_has_every_key_of_a_case(page: str) -> None:
-    section = page.split("\n## Cases\n")[1]
+def test_the_table_has_every_key_of_a_case(cases: str) -> None:
+    section = cases.split("\n## ", maxsplit=1)[0]
     # Without a log a case is refused, in words of its own.
     same(told(section), keys(_CaseFile) | {"log": "needed"})

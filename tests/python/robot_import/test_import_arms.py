@@ -164,7 +164,7 @@ def test_every_urdf_of_the_package_is_compared_or_said_to_hold_no_arm():
 
 
 def test_the_page_tells_every_arm(repository: Path):
-    page = (repository / "docs" / "models.md").read_text(encoding="utf-8")
+    page = (repository / "docs" / "model_checks.md").read_text(encoding="utf-8")
     table = page.split("| largest difference, of the largest force |\n")[1].split("\n\n")[0]
     rows = re.findall(r"^\| `(.*)` \| (.*) \| (\d+) \| (.*) \|$", table, flags=re.MULTILINE)
     arms = [(Path(file).name, tip or "end", axes) for file, tip, axes in URDF_ARMS]
@@ -174,7 +174,7 @@ def test_the_page_tells_every_arm(repository: Path):
 
 
 def main() -> None:
-    """Print the table of docs/models.md."""
+    """Print the table of docs/model_checks.md."""
     print("| file | to | axes | largest difference, of the largest force |\n|---|---|---|---|")
     for file, tip, axes in URDF_ARMS:
         found = found_in_urdf(file, tip, axes)
