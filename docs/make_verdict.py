@@ -18,10 +18,10 @@ HEAD = """\
 
 # The verdict
 
-`axisight diagnose CASE --json verdict.json`, `Diagnosis.to_verdict()`: one JSON object. Readers ignore keys
-that they do not know; keys are added, never changed. Ratios are plain numbers, not per cent; numbers that do
-not exist (the gap of a simulation that broke off) are `null`. The JSON Schema itself is printed by
-`axisight schema` and is `axisight.gap.verdict_schema()`:
+This page answers: which keys does the JSON of a diagnosis have, and what do they mean?
+
+`axisight diagnose CASE --json verdict.json` writes it; in Python it is `Diagnosis.to_verdict()`. To check and
+read it:
 
 ```python
 import json
@@ -36,7 +36,13 @@ for cause in verdict["causes"]:
     print(cause["effect"], cause["axis"], cause["probability"])
 ```
 
-`a.b` is the key `b` of the object `a`, `a[]` an element of the list `a`.
+`axisight schema` prints the JSON Schema; in Python it is `axisight.gap.verdict_schema()`.
+
+- Ignore keys that you do not know: versions add keys and never change them.
+- Ratios are plain numbers, not per cent.
+- Numbers that do not exist, such as the gap of a simulation that broke off, are `null`.
+- `a.b` is the key `b` of the object `a`, `a[]` an element of the list `a`, `a.*` any entry of the object `a`.
+- Words such as *gap*, *floor* and *re-fit* are explained in the [glossary](style.md#glossary).
 """
 
 TYPES = {
@@ -51,7 +57,12 @@ TYPES = {
 
 
 def resolved(part: Mapping[str, Any], schema: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a part of the schema with what it refers to; its own words win."""
+    """Return a part of the schema with what it refers to, one that may be null included; its own words win."""
+    if "anyOf" in part:
+        (other,) = (choice for choice in part["anyOf"] if choice.get("type") != "null")
+        found = resolved(other, schema)
+        own = {key: value for key, value in part.items() if key != "anyOf"}
+        return {**found, "type": [found["type"], "null"], **own}
     reference = part.get("$ref")
     if reference is None:
         return dict(part)
