@@ -8,6 +8,7 @@
 #   make format  rewrite the sources in the format that lint asks for
 #   make docs    regenerate the generated pages and build the site into site/
 #   make gallery draw the effects and all plots anew for their pages
+#   make notebooks   run the notebooks of the examples and store their outputs
 #   make wheel-smoke   the wheel in an empty environment: installed, asked, its demo run, timed
 #   make fuzz    readers of every format against 10,000 damaged files each (FUZZ=n for others)
 #   make crash   studies and fleets killed 100 times (KILLS=n), damaged, starved and orphaned keep their bits
@@ -45,7 +46,7 @@ SOURCES := $(sort $(shell find crates python -type f \
 # The thesis's study is a package of its own, pure Python.
 STUDY := $(sort $(shell find thesis -type f -not -path '*/__pycache__/*' -not -name '.*'))
 
-.PHONY: setup demo test test-rust test-python lint format docs gallery wheel-smoke fuzz crash deny lock lowest bench clean force
+.PHONY: setup demo test test-rust test-python lint format docs gallery notebooks wheel-smoke fuzz crash deny lock lowest bench clean force
 .DELETE_ON_ERROR:
 
 setup: $(STAMPS)/test-tools
@@ -92,6 +93,9 @@ docs: $(STAMPS)/docs-tools
 gallery: $(STAMPS)/installed
 	$(BIN)/python docs/make_gallery.py
 	$(BIN)/python docs/make_plots.py
+
+notebooks: $(STAMPS)/test-tools
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python docs/make_notebooks.py
 
 wheel-smoke: $(WHEELS)/.built
 	$(PYTHON) tests/wheel_smoke.py $(WHEELS)

@@ -1,4 +1,4 @@
-"""Print the measured tables of docs/simulation.md, to be pasted there.
+"""Print the measured tables of docs/simulation_accuracy.md, to be pasted there.
 
 Usage: python docs/measure_simulation.py
 

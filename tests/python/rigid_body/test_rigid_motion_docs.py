@@ -1,4 +1,4 @@
-"""What docs/rigid_body.md shows of motions, bodies that exist and trajectories runs."""
+"""What docs/rigid_motion.md shows of motions, bodies that exist and trajectories runs."""
 
 import re
 from pathlib import Path
@@ -9,14 +9,14 @@ import pytest
 
 @pytest.fixture(scope="module")
 def shown(repository: Path) -> dict[str, Any]:
-    page = (repository / "docs" / "rigid_body.md").read_text(encoding="utf-8")
+    page = (repository / "docs" / "rigid_motion.md").read_text(encoding="utf-8")
     names: dict[str, Any] = {}
     exec("\n".join(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)), names)
     return names
 
 
 def test_motion_is_as_printed(shown: dict[str, Any], repository: Path) -> None:
-    page = (repository / "docs" / "rigid_body.md").read_text(encoding="utf-8")
+    page = (repository / "docs" / "rigid_motion.md").read_text(encoding="utf-8")
     assert str(shown["motion"]) in page
 
 
