@@ -19,6 +19,7 @@ ACTS = {
     "arm": "masses and springs of the arm",
     "base": "what the arm stands on",
     "sensor": "sensor: between true and measured motor position",
+    "controller": "the controller, or the references it is given",
 }
 
 SCOPES = {"axis": "one axis", "axes": "two axes", "arm": "the whole arm"}
@@ -28,13 +29,43 @@ HEAD = """\
 
 # Effects
 
-What a machine may have and a simulator may lack. Every effect reduces to the base model when all
-its *amplitudes* are at their neutral value, whatever its *shape* parameters are; the neutral value
-of a shape parameter is the usual one. Bounds are what is accepted, `typical` is the natural scale
-of a search. Priors say how values are spread over machines: *half-normal*, off the neutral value with
-the typical size as standard deviation; *log-normal*, about the typical size with that standard
-deviation of the logarithm; *uniform*, anywhere between the bounds. Symbols, signs and sides are those
-of [conventions](conventions.md).
+What may a machine have that its simulator lacks? This page lists every effect that Axisight simulates and looks
+for, with its formula, its parameters and its source. [Effects in pictures](gallery.md) shows what each does to the
+torque. In Python, `axisight.effect_info(name)` has the same. Add an effect to a simulation like this:
+
+```python
+import numpy as np
+import axisight
+
+robot = axisight.load_robot("irb6600_like")
+reference = 5 * np.sin(0.01 * np.arange(2000))[:, None] * [1, 0, 0]  # motor side, rad/s
+friction = axisight.Effect("coulomb_friction", 1, {"coulomb_nm": 0.5})
+run = axisight.simulate(robot, reference, effects=[friction])
+```
+
+How to read the tables of parameters:
+
+| column | meaning |
+|---|---|
+| role | an *amplitude* says how large the effect is. With all amplitudes at their neutral value the effect does nothing, whatever its *shape* parameters are |
+| neutral | for an amplitude the value without effect; for a shape parameter the usual value |
+| bounds | values that are accepted |
+| typical | natural scale of a search |
+| prior | how values are spread over machines |
+| prior: half-normal | off the neutral value, with the typical size as standard deviation |
+| prior: log-normal | about the typical size, with the given standard deviation of the logarithm |
+| prior: uniform | anywhere between the bounds |
+
+How to read the lists:
+
+| entry | meaning |
+|---|---|
+| model error | how far accepted formulas of the effect differ, in per cent of the torque that the effect explains |
+| linear model | how `model="linear"` [simulates](simulation.md#the-linear-model) the effect |
+| inverse dynamics | whether a comparison without a simulated controller can show the effect |
+| twins | effects with the same logs: no log tells them apart |
+
+Symbols, signs and sides are those of the [conventions](conventions.md).
 """
 
 
@@ -53,51 +84,55 @@ LINEAR = {
     "slope": "by its slope at rest",
     "path": "before the plant",
     "waves": "as waves over the motor angle",
-    "no": "not at all",
+    "no": "refused",
 }
 
 
-def facts(effect: Mapping[str, Any]) -> str:
-    """Return what else is known of an effect, in a sentence or two."""
-    out = [f"Family: {effect['family'].replace('_', ' ')}."]
+def facts(effect: Mapping[str, Any]) -> list[str]:
+    """Return what else is known of an effect, as items of a list."""
+    acts = ACTS.get(effect["acts"], effect["acts"])
+    out = [
+        f"Acts on: {acts}; {SCOPES[effect['scope']]}.",
+        f"Family: {effect['family'].replace('_', ' ')}.",
+    ]
+    if effect["stands_for"]:
+        quantity, change = effect["stands_for"]
+        out.append(f"Stands for {article(change)} {change} change of the robot's `{quantity}`.")
     if effect["contains"]:
         out.append(f"Contains {', '.join(f'`{n}`' for n in effect['contains'])}.")
     if effect["twins"]:
         twins = ", ".join(f"`{n}`" for n in effect["twins"])
-        alone = "Of an axis alone, commands" if effect["twins_alone"] else "Commands"
-        out.append(f"{alone} and motor angles are those of {twins}: no log tells them apart.")
+        alone = ", if it is on one axis only" if effect["twins_alone"] else ""
+        out.append(f"Twins: {twins}{alone}.")
     if effect["usual"]:
         usual = ", ".join(f"`{n}`" for n in effect["usual"])
-        out.append(
-            f"Where a motion asks little of it, it looks like {usual}, which is met more often."
-        )
+        out.append(f"Looks like {usual}, which is more common, if a motion excites it little.")
     out += kin(effect)
     if effect["parts"]:
-        out.append(f"Two simpler ones imitate it: {', '.join(f'`{n}`' for n in effect['parts'])}.")
-    if effect["stands_for"]:
-        quantity, change = effect["stands_for"]
-        out.append(f"Stands for {article(change)} {change} change of the robot's `{quantity}`.")
-    inverse = "can" if effect["inverse_dynamics"] else "cannot"
-    out.append(f"A linear model holds it {LINEAR[effect['linear']]}; inverse dynamics {inverse}.")
-    return " ".join(out)
+        parts = " and ".join(f"`{n}`" for n in effect["parts"])
+        out.append(f"Imitated by {parts} together.")
+    error = f"{100 * effect['formula']['error']:g} %"
+    inverse = "yes" if effect["inverse_dynamics"] else "no"
+    out += [
+        f"Model error: {error}. Linear model: {LINEAR[effect['linear']]}. Inverse dynamics: {inverse}.",
+        f"Source: {effect['source']}.",
+    ]
+    return out
 
 
 def kin(effect: Mapping[str, Any]) -> list[str]:
-    """Return what it is akin to, and by how much formulas of it differ, in sentences."""
+    """Return which simpler or similar law it is akin to, as items of a list."""
     out = []
     if plainer := effect["plainer"]:
         adds = ", ".join(f"`{n}`" for n in plainer["adds"])
         out.append(
-            f"Where {adds} {'show' if len(plainer['adds']) > 1 else 'shows'} nothing, `{plainer['law']}` is "
-            f"{plainer['likelier']:g} times likelier."
+            f"`{plainer['law']}` is {plainer['likelier']:g} times likelier where the logs do not show {adds}."
         )
     if like := effect["resembles"]:
         shape = ", ".join(f"`{name}` {value:.3g}" for name, value in like["shape"])
         out.append(
-            f"With {shape} it is like `{like['law']}` of {like['ratio']:.3g} `{like['size']}`."
+            f"With {shape} it is like `{like['law']}` by {like['ratio']:.3g} times its `{like['size']}`."
         )
-    error = f"{100 * effect['formula']['error']:g} %"
-    out.append(f"Formulas of it may differ by {error} of what it explains.")
     return out
 
 
@@ -108,8 +143,6 @@ def article(word: str) -> str:
 
 def section(effect: Mapping[str, Any]) -> str:
     """Return the Markdown of one row of the effect table."""
-    scope = SCOPES[effect["scope"]]
-    acts = ACTS.get(effect["acts"], effect["acts"])
     lines = [
         f"## `{effect['name']}`",
         "",
@@ -117,9 +150,7 @@ def section(effect: Mapping[str, Any]) -> str:
         "",
         f"    {effect['equation']}",
         "",
-        f"Acts on: {acts}. Belongs to {scope}. Source: {effect['source']}.",
-        "",
-        facts(effect),
+        *(f"- {fact}" for fact in facts(effect)),
         "",
         "| parameter | unit | role | neutral | bounds | typical | prior |",
         "|---|---|---|---|---|---|---|",

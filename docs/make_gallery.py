@@ -37,16 +37,21 @@ HEAD = """\
 
 # Effects in pictures
 
-What a simulator without the effect is off: the torque that the controller commands on a machine with
-the effect, less that on one without, both under the same references and without noise. Left over
-time, right over what shows the effect best. Sizes are the typical ones of [the table of
-effects](effects.md) unless stated; the robot is the preset `irb6600_like`, the effect on axis 1, which
-turns about the vertical, or on axis 2, which carries weight. All three axes follow the same motion,
-which is one of three: a slow swing, a fast one, or a broad band.
+What does each effect do to the torque? Every picture shows the torque that a simulator without the effect misses:
+the torque that the controller commands on a machine with the effect, minus the torque on a machine without it. Both
+follow the same references, without noise. The left plot is over time. The right plot is over the quantity that
+shows the effect best.
+
+| | |
+|---|---|
+| robot | the preset `irb6600_like` |
+| axis | 1, which turns about the vertical; 2 for effects that need weight |
+| sizes | the typical ones of [the table of effects](effects.md), unless stated |
+| motion | all three axes follow the same one: a slow swing, a fast swing, or a broad band |
 
 ![Motor speed and torque of axis 1 in the three motions](images/effects/motions.png)
 
-One picture is no proof: effects that look alike here are told apart by other motions, or not at all
+Do not take one picture as proof. Effects that look alike here are told apart by other motions, or not at all
 ([what cannot be told apart](undecidable.md)).
 """
 

@@ -31,43 +31,54 @@ HEAD = """\
 
 # Plots
 
-Every function returns a matplotlib `Figure`: save it as a picture or a vector (`.savefig("gap.pdf")`), change
-what you like before. Colours are told apart by colour-blind readers and in grey print (`axisight.palette`);
-units stand on every axis.
+How do you draw logs, simulations, responses and diagnoses? Each function below returns a matplotlib `Figure`.
+Change what you like, then save it as a picture or a vector graphic (`.savefig("gap.pdf")`):
+
+```python
+import numpy as np
+import axisight
+
+robot = axisight.load_robot("irb6600_like")
+reference = 20 * np.sin(0.01 * np.arange(2000))[:, None] * [1, 0, -1]  # motor side, rad/s
+figure = axisight.plot_simulation(axisight.simulate(robot, reference))
+figure.savefig("run.pdf")
+```
+
+Every axis has its unit. Colours stay distinct for colour-blind readers and in grey print (`axisight.palette`).
 """
 
 # Function, what it is given, and what it shows.
 SHOWN = {
     "axisight.plot_log": ("log", "Torque and position of every axis of a log."),
-    "axisight.plot_simulation": ("run", "The same of a simulation."),
+    "axisight.plot_simulation": ("run", "Torque and position of every axis of a simulation."),
     "axisight.plot_gap_map": (
         "found",
-        "Where the gap of a diagnosis lies: share of each axis by frequency and regime. Cells that do not stand "
-        "out of the noise are grey.",
+        "Where the gap of a diagnosis lies: share of each axis by frequency and regime. Cells within the noise "
+        "are grey.",
     ),
-    "axisight.plot_ranking": ("found", "The most probable candidates."),
+    "axisight.plot_ranking": ("found", "The most probable hypotheses of a diagnosis."),
     "axisight.plot_parameters": (
         "found",
-        "What was found: every number with its 95 % interval, over its value.",
+        "Values of the causes with their 95 % intervals, each relative to its value.",
     ),
     "axisight.plot_overlay": (
         "found, axis=2",
-        "Measured torque, and the simulator before and after, on a log that took no part.",
+        "Measured torque, and the torque of the simulator before and after, on a validation log.",
     ),
     "axisight.plot_response_matrix": ("response", "A measured frequency response, all elements."),
-    "axisight.plot_bode": ("responses, output=1, input=2", "One element, with 95 % bands."),
+    "axisight.plot_bode": ("responses, output=1, input=2", "One element of a frequency response, with 95 % bands."),
     "axisight.excitation.plots.plot_signal": (
         "signal",
         "A period of a multisine, its lines, and the histogram of its samples.",
     ),
-    "axisight.excitation.plots.plot_references": ("made", "References of all experiments."),
+    "axisight.excitation.plots.plot_references": ("made", "References of all experiments of a design."),
     "axisight.blind.plots.plot_confusion": (
         "score",
-        "What a benchmark's cases withheld, and what was named first ([how often it is right](truth.md)).",
+        "Confusion matrix of a benchmark: true causes against causes named first ([how often it is right](truth.md)).",
     ),
     "axisight.blind.plots.plot_calibration": (
         "score",
-        "How often causes were right against how probable they were said to be.",
+        "How often causes were right, against their probability.",
     ),
 }
 

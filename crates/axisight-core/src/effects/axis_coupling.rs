@@ -22,7 +22,7 @@ const fn amplitude(
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "axis_coupling",
-    summary: "the drive of the second axis goes through the first one: it is turned along, and has friction with it",
+    summary: "the drive of the second axis runs through the first axis, which turns it along and shares friction with it",
     equation: "q_2 = r_2 phi_2 + c r_1 phi_1;  tau_f = F_v s + F_c tanh(s / v_0),  s = phi_1' + n phi_2', on both motors: 1 and n times",
     source: "Vandanjon, Janot, Gautier, Khatib (2008), dynamic identification of a Staubli TX-40 (coupled axes 5 and 6)",
     scope: Scope::Axes,

@@ -19,7 +19,7 @@ const fn compliance(name: &'static str) -> ParameterInfo {
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "base_compliance",
-    summary: "the base rocks under the arm",
+    summary: "the base yields and rocks under the arm",
     equation: "tau = q_b / c + (T_d / c) q_b',  below the first joint about x and y of the base",
     source: "Moberg (2010), Modeling and Control of Flexible Manipulators (extended flexible joint model)",
     scope: Scope::Arm,

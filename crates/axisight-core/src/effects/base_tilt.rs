@@ -17,7 +17,7 @@ const fn angle(name: &'static str) -> ParameterInfo {
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "base_tilt",
-    summary: "the base stands tilted: gravity comes from another direction",
+    summary: "the base is tilted, so gravity comes from another direction",
     equation: "g' = R_y(-b) R_x(-a) g",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.1 (gravity in the base frame)",
     scope: Scope::Arm,

@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "cable_stiffness",
-    summary: "cables and hoses pull the joint back to where they rest, in proportion to the angle",
+    summary: "cables and hoses pull the joint back to their rest angle, like a spring",
     equation: "tau_j = p - k q on the joint, at rest where q = p / k",
     source: "Hooke's law on the angle from rest",
     acts: Acts::Joint,

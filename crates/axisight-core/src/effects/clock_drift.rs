@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "clock_drift",
-    summary: "the machine's clock is not that of the references in its logs: the two drift apart",
+    summary: "the clock of the machine and that of the logged references drift apart",
     equation: "phi_r'(t) -> phi_r'((1 + e) t)",
     source: "Eidson (2006), Measurement, Control and Communication Using IEEE 1588, chapter 2 (clock rates)",
     scope: Scope::Arm,

@@ -17,7 +17,7 @@ const fn change(name: &'static str) -> ParameterInfo {
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "controller_gain",
-    summary: "the controller has other gains than the stated ones",
+    summary: "the controller has gains other than the stated ones",
     equation: "k_p' = k_p (1 + e_p),  k_i' = k_i (1 + e_i),  k_v' = k_v (1 + e_v)",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 8.3 (decentralized control)",
     acts: Acts::Controller,

@@ -16,7 +16,7 @@ const fn wave(name: &'static str) -> ParameterInfo {
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "encoder_eccentricity",
-    summary: "the position is taken from an encoder on the joint that sits off centre: an error once a turn of the joint",
+    summary: "the encoder sits off centre on the joint: a position error once per turn of the joint",
     equation: "v_phi = (a (cos(q) - cos(q_0)) + b (sin(q) - sin(q_0))) / r,  q_0 where a log begins",
     source: "Heidenhain, Rotary Encoders catalogue: measuring error of eccentric mounting, e / R once a turn",
     acts: Acts::Sensor,

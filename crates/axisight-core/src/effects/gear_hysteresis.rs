@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "gear_hysteresis",
-    summary: "a loop of torque over deflection: a spring beside the gear's slips, or part of it",
+    summary: "torque and deflection of the gear form a loop: part of its stiffness, or a spring beside it, slips",
     equation: "tau_g = k (1 - b a) delta + a k sum_j D_j z_j / 4,  D_j z_j' = delta' - ((1 - s/2) |delta'| z_j + s/2 delta' |z_j|) (1 - s + s z_j^4),  D_j = D (1 + s (j - 2.5) 0.4)",
     source: "four Bouc-Wen elements: Wen (1976), J. Eng. Mech. Div. 102(2), with A = 1, beta = 1 - s/2, gamma = s/2; with s = 0 all are Dahl's (1968, TOR-0158), with s = 1 about the sliders of Iwan (1966), J. Appl. Mech. 33(4), evenly apart; beside the spring as in Dhaouadi, Ghorbel, Gandhi (2003), IEEE Trans. Ind. Electron. 50(6)",
     acts: Acts::Transmission,

@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "gravity_compensation",
-    summary: "a balancer (spring or counterweight) the simulator lacks, or has wrong",
+    summary: "a balancer (spring or counterweight) that the simulator lacks or has with wrong values",
     equation: "tau_j = a sin q + b cos q on the joint",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.3",
     acts: Acts::Joint,

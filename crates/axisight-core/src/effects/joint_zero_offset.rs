@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "joint_zero_offset",
-    summary: "the zero of a joint is not where it is modelled: its encoder was mounted or set otherwise",
+    summary: "the zero of a joint is not where it is modelled: its encoder was mounted or set differently",
     equation: "q + q_0 in M, c and g",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 2.11 (kinematic calibration)",
     acts: Acts::Arm,

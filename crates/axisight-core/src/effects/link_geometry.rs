@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "link_geometry",
-    summary: "the next axis does not lie where it is modelled in the link of this one: a length or an offset is wrong; behind the last axis there is none",
+    summary: "the next axis is not where the model of this link has it: a length or an offset is wrong; the last axis has no next one",
     equation: "p + d, from this joint to the next",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 2.11 (kinematic calibration)",
     acts: Acts::Arm,

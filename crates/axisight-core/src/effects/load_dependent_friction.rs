@@ -6,7 +6,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "load_dependent_friction",
-    summary: "friction in proportion to the torque the gear carries",
+    summary: "friction in proportion to the torque that the gear carries",
     equation: "tau_f = mu |tau_load| tanh(phi' / v_0)",
     source: "Hamon, Gautier, Garrec (2010), Dynamic identification of robots with a dry friction model depending on load and velocity, IROS",
     acts: Acts::Motor,

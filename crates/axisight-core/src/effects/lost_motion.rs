@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "lost_motion",
-    summary: "the gear is soft around its middle, where few of its teeth carry, and as stiff as modelled beyond",
+    summary: "the gear is soft at small torques, where few teeth carry, and as stiff as modelled beyond",
     equation: "tau_g = k (delta - s m),  m = (hypot(delta + b, c) - hypot(delta - b, c)) hypot(1, rho) / 2,  c = rho b:  dm/ddelta = 1 at 0",
     source: "Nabtesco, RV series catalogue: lost motion, the torsion at 3 % of the rated torque",
     acts: Acts::Transmission,

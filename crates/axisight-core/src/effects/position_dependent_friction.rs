@@ -17,7 +17,7 @@ const fn wave(name: &'static str) -> ParameterInfo {
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "position_dependent_friction",
-    summary: "dry friction that is larger in some places of the turn than in others",
+    summary: "dry friction that changes with the angle",
     equation: "tau_f = (m + c cos(n phi) + s sin(n phi)) tanh(w / w_s),  n: r for once a turn of the joint; a share a of it behind the gear, there with q / r for phi",
     source: "Armstrong-Helouvry (1991), Control of Machines with Friction (joints of a PUMA 560 over their position); tanh form as coulomb_friction",
     acts: Acts::Motor,

@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "position_quantization",
-    summary: "the measured position comes in steps: an encoder of few lines",
+    summary: "the measured position comes in steps, as from a coarse encoder",
     equation: "phi_m = s round(phi / s)",
     source: "Widrow, Kollar (2008), Quantization Noise, chapter 1",
     acts: Acts::Sensor,

@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "power_supply_sag",
-    summary: "the drive gives less of its torque the more power it draws: its supply gives way",
+    summary: "the supply voltage drops under load: the more power the drive draws, the less of its torque it delivers",
     equation: "tau = u (1 - x / (1 + c x)),  x = s max(u phi', 0);  a line at c = 0, 1 / (1 + x) at c = 1",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 5.2 (power supply and amplifier)",
     acts: Acts::Motor,

@@ -6,7 +6,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "presliding_friction",
-    summary: "friction that yields like a spring before it slips, with a memory of its own",
+    summary: "friction that yields like a spring before it slips, and remembers its deflection",
     equation: "tau_f = F_c (z + T_b z'),  z' = (phi' - |phi'| z / g) / (delta + T_r |phi'|),  g = 1 + (s - 1) exp(-(phi' / v_s)^2)",
     source: "Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE TAC 40(3), eqs. (1)-(4) with sigma_0 = F_c / delta, sigma_1 = sigma_0 T_b",
     acts: Acts::Motor,

@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "rotor_inertia",
-    summary: "inertia of motor and gear that the simulator leaves out, as model files of arms mostly do",
+    summary: "inertia of motor and gear that the simulator leaves out, as most model files of arms do",
     equation: "J_m + dJ",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 7.1 (rotors in the kinetic energy)",
     acts: Acts::Motor,

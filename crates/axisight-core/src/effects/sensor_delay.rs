@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "sensor_delay",
-    summary: "the controller reads and logs the position late: of an axis alone the logs of a delay of the drive, other axes feel its motion earlier than it is read",
+    summary: "the controller reads and logs the position late",
     equation: "phi_measured(t) = phi(t - T_d)",
     source: "Astrom, Wittenmark (1997), Computer-Controlled Systems, section 2.3",
     acts: Acts::Sensor,

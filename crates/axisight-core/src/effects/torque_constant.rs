@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "torque_constant",
-    summary: "the motor gives more or less torque than commanded, in proportion",
+    summary: "the motor delivers more or less torque than commanded, in proportion",
     equation: "tau = (1 + e) u",
     source: "Gautier, Briot (2014), Global identification of joint drive gains, J. Dyn. Sys. 136(5)",
     acts: Acts::TorquePath,

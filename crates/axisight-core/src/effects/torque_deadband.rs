@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "torque_deadband",
-    summary: "the drive delivers nothing of small torques, and less of all others",
+    summary: "the drive delivers nothing for small commands, and too little for all others",
     equation: "tau = u - clip(u, -d, d)",
     source: "Tao, Kokotovic (1996), Adaptive Control of Systems with Actuator and Sensor Nonlinearities, chapter 2 (dead zones)",
     acts: Acts::TorquePath,

@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "torque_sensor_gain",
-    summary: "the drive reports a torque other than the one the motor gets by a constant factor",
+    summary: "the logged torque differs from the motor's torque by a constant factor",
     equation: "u_reported = (1 + e) u",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 5.4 (sensors)",
     acts: Acts::Sensor,

@@ -4,7 +4,7 @@ use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Linear, tor
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "torque_sensor_offset",
-    summary: "the drive reports a torque smaller than the one the motor gets by a constant",
+    summary: "the logged torque is too small by a constant",
     equation: "u_reported = u - o",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 5.4 (sensors)",
     acts: Acts::Sensor,

@@ -17,7 +17,7 @@ const fn wave(name: &'static str) -> ParameterInfo {
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "transmission_error",
-    summary: "the gear runs ahead and behind periodically over the motor angle",
+    summary: "the gear leads and lags periodically with the motor angle",
     equation: "delta = r phi + e - q, e = a cos(n phi) + b sin(n phi) + a_2 cos(m n phi) + b_2 sin(m n phi); tau_motor = (r + c de/dphi) tau_gear",
     source: "Tuttle, Seering (1996), A nonlinear model of a harmonic drive gear transmission, IEEE Trans. Robotics Autom. 12(3)",
     acts: Acts::Transmission,

@@ -5,7 +5,7 @@ use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "velocity_filter",
-    summary: "the controller takes the measured speed through a low-pass",
+    summary: "the controller low-passes the measured speed",
     equation: "w_k = w_(k-1) + T / (T + T_v) (v_k - w_(k-1))",
     source: "Siciliano et al. (2009), Robotics: Modelling, Planning and Control, section 8.3 (decentralized control; the speed from positions)",
     acts: Acts::Controller,
