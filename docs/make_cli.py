@@ -36,7 +36,7 @@ def cell(text: str) -> str:
 
 def commands() -> Iterator[tuple[str, Callable[..., Any], str]]:
     """Every command: the words that call it, its function and its help."""
-    for name, (place, _) in _COMMANDS.items():
+    for name, (place, *_) in _COMMANDS.items():
         module, attribute = place.split(":")
         found = getattr(import_module(f"axisight.cli.{module}"), attribute)
         if not isinstance(found, typer.Typer):
@@ -82,7 +82,7 @@ class Parameter:
         held = {self.kind, *get_args(self.kind)}
         held |= {inner for kind in held for inner in get_args(kind)}
         named = [word for kind, word in kinds.items() if kind in held]
-        return self.info.metavar or named[0]
+        return (self.info.metavar or "").strip() or named[0]
 
     def row(self) -> str:
         """A row of a table."""
@@ -107,7 +107,7 @@ class Parameter:
     @property
     def word(self) -> str:
         """What stands for an argument."""
-        return self.name.upper() + ("..." if self.repeats else "")
+        return (self.info.metavar or self.name.upper()) + ("..." if self.repeats else "")
 
 
 def parameters(function: Callable[..., Any]) -> list[Parameter]:
@@ -131,10 +131,18 @@ def section(name: str, function: Callable[..., Any], said: str) -> str:
     if options:
         words.append("[OPTIONS]")
     text = f"## {name}\n\n```text\n{' '.join(words)}\n```\n\n{paragraphs(said)}\n"
-    for title, part in (("argument", arguments), ("option", options)):
+    for title, part in {"argument": arguments, **grouped(options)}.items():
         if part:
             text += f"\n| {title} | |\n|---|---|\n" + "".join(p.row() for p in part)
     return text
+
+
+def grouped(options: list[Parameter]) -> dict[str, list[Parameter]]:
+    """Return options by their group in the help, common ones first."""
+    groups: dict[str, list[Parameter]] = {"option": []}
+    for option in options:
+        groups.setdefault((option.info.rich_help_panel or "option").lower(), []).append(option)
+    return groups
 
 
 def paragraphs(text: str) -> str:

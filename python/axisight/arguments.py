@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
@@ -136,6 +138,41 @@ def one_of(field: str, value: object, known: Iterable[str]) -> str:
     if not isinstance(value, str) or value not in names:
         raise InputError(f"{field}: expected one of {', '.join(names)}, got {shown(value)}")
     return value
+
+
+def axis_number(value: object, joints: Sequence[str], field: str = "axis") -> int:
+    """Return the number of an axis (from 1) for a number or the name of a joint.
+
+    ``joints``: names of the robot's joints in the order of its axes. Digits as text count as a
+    number where no joint has that name. Raises InputError naming ``field``, the joints and the
+    nearest of them.
+    """
+    if isinstance(value, str):
+        if list(joints).count(value) == 1:
+            return list(joints).index(value) + 1
+        if value.isdecimal() and 1 <= int(value) <= len(joints):
+            return int(value)
+    else:
+        array = _array(value, "iu")
+        if array is not None and not array.ndim and 1 <= int(array) <= len(joints):
+            return int(array)
+    expected = "1" if len(joints) == 1 else f"1 to {len(joints)}"
+    raise InputError(
+        f"{field}: expected {expected} or a joint name ({', '.join(joints)}), "
+        f"got {shown(value)}{_nearest_axis(value, joints)}"
+    )
+
+
+def _nearest_axis(value: object, joints: Sequence[str]) -> str:
+    """Return a question with the axis that was meant, empty where none is near."""
+    if not isinstance(value, str):
+        return ""
+    numbered = re.fullmatch(r"(?:axis|joint|j|a)[ _-]?0*(\d{1,4})", value, re.IGNORECASE)
+    if numbered and 1 <= int(numbered[1]) <= len(joints):
+        return f". Did you mean {int(numbered[1])}?"
+    lower = {name.lower(): name for name in joints if name.isprintable()}
+    near = get_close_matches(value[:_LONGEST_NAME].lower(), lower, n=1, cutoff=0.6)
+    return f". Did you mean {lower[near[0]]!r}?" if near else ""
 
 
 def words(field: str, value: object) -> str:

@@ -52,7 +52,7 @@ def test_a_diagnosis_loads_no_plots():
 @pytest.mark.parametrize("name", _COMMANDS)
 def test_the_list_of_commands_says_what_they_say(name):
     command = load_command(name)
-    assert inspect.cleandoc(command.help or "").splitlines()[0] == _COMMANDS[name][1]
+    assert inspect.cleandoc(command.help or "").splitlines()[0] == _COMMANDS[name][2]
     helped = CliRunner().invoke(app, [name, "--help"])
     assert helped.exit_code == 0
     assert f" {name} " in helped.output.split("Usage:")[1].split("\n")[0]

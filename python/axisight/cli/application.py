@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import gc
+import inspect
 import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_type_hints
 
 import typer
 from typer.core import TyperGroup
@@ -16,69 +18,83 @@ from typer.core import TyperGroup
 from axisight.cli.screen import OUT
 from axisight.cli.stopping import exit_status
 
-# Commands, where each lives, and the first line of its help: without it the list of commands would
-# have to load them all, with the libraries of all.
+# Commands: where each lives, the group of `axisight --help` that it is in, and the first line of its
+# help. Without that line the list of commands would have to load them all, with the libraries of all.
 _COMMANDS = {
-    "excite": (
-        "excite:excite_command",
-        "Make references for a robot, check them against its limits in simulation, and write them.",
-    ),
-    "identify": (
-        "identify:identify_app",
-        "Identify a robot from logs or frequency responses, and write it back as a robot file.",
-    ),
-    "blind": (
-        "blind:blind_app",
-        "The withheld-effect benchmark: cases of other engines, diagnoses, a score.",
-    ),
-    "montecarlo": (
-        "montecarlo:montecarlo_command",
-        "Run a Monte Carlo study; the same study and seed give the same bits, however it is run.",
-    ),
-    "reproduce": (
-        "reproduce:reproduce_command",
-        "Reproduce the tables and figures of Wernholt's thesis on the preset robot.",
-    ),
-    "robot": (
-        "robot_files:robot_app",
-        "Make robot files of URDF, MJCF and tables of Denavit and Hartenberg.",
-    ),
-    "simulate": (
-        "simulate:simulate_command",
-        "Simulate a robot along the references or torques of a log and write the result as a log.",
-    ),
     "diagnose": (
         "diagnose:diagnose_command",
-        "Say where a simulator disagrees with measured logs, which effect causes it, and how far it "
-        "shrinks.",
-    ),
-    "explore": (
-        "explore:explore_command",
-        "Look at logs beside the simulator on a local page, and try causes by hand.",
-    ),
-    "check": (
-        "check:check_command",
-        "Report rate, gaps, NaN, saturation, quantization, suspicious units and constant channels.",
-    ),
-    "columns": (
-        "columns:columns_app",
-        "List, show and guess column maps: where a log keeps its signals, in which unit.",
-    ),
-    "schema": (
-        "about:schema_command",
-        "Print the JSON Schema of the verdict that `diagnose --json` writes.",
-    ),
-    "effects": (
-        "about:effects_command",
-        "List the effects that can be simulated, fitted and named as causes.",
+        "Diagnose",
+        "Find why the simulator differs from the logs: which causes, of what size, how sure.",
     ),
     "demo": (
         "demo:demo_command",
-        "Make a small case (a simulated machine with a withheld effect) and diagnose it.",
+        "Diagnose",
+        "Make a small case, a simulated machine with an effect that its simulator lacks, and diagnose it.",
+    ),
+    "check": (
+        "check:check_command",
+        "Diagnose",
+        "Check a log: rate, gaps, NaN, saturation, quantization, units, constant channels.",
+    ),
+    "explore": (
+        "explore:explore_command",
+        "Diagnose",
+        "Look at logs beside the simulator on a local page, and try causes by hand.",
+    ),
+    "identify": (
+        "identify:identify_app",
+        "Identify",
+        "Identify a robot from logs or frequency responses, and write it back as a robot file.",
+    ),
+    "excite": (
+        "excite:excite_command",
+        "Identify",
+        "Make references for a robot, check them against its limits in simulation, and write them.",
+    ),
+    "simulate": (
+        "simulate:simulate_command",
+        "Simulate",
+        "Simulate a robot along the references or torques of a log and write the result as a log.",
+    ),
+    "montecarlo": (
+        "montecarlo:montecarlo_command",
+        "Simulate",
+        "Run a Monte Carlo study; the same study and seed give the same bits, however it is run.",
+    ),
+    "columns": (
+        "columns:columns_app",
+        "Files",
+        "List, show and guess column maps: where a log keeps its signals, in which unit.",
+    ),
+    "robot": (
+        "robot_files:robot_app",
+        "Files",
+        "Make robot files of URDF, MJCF and tables of Denavit and Hartenberg.",
+    ),
+    "effects": (
+        "about:effects_command",
+        "Reference",
+        "List the effects that can be simulated, fitted and named as causes.",
+    ),
+    "schema": (
+        "about:schema_command",
+        "Reference",
+        "Print the JSON Schema of the verdict that `diagnose --json` writes.",
     ),
     "completion": (
         "completion:completion_command",
+        "Reference",
         "Print the script by which bash, zsh or fish complete commands and options.",
+    ),
+    "blind": (
+        "blind:blind_app",
+        "Benchmarks",
+        "The withheld-effect benchmark: cases of other engines, diagnoses, a score.",
+    ),
+    "reproduce": (
+        "reproduce:reproduce_command",
+        "Benchmarks",
+        "Reproduce the tables and figures of Wernholt's thesis on the preset robot.",
     ),
 }
 
@@ -93,12 +109,12 @@ _ONLY_PRINT = ("schema", "effects", "completion", "list", "show")
 _FURTHER = re.compile(r"(Did you mean '[^']*')(?:, '[^']*')+\?")
 
 _NEXT_STEPS = """\
-Axisight says where a robot's simulator and its logs disagree, and which effect causes it.
+Axisight finds why a robot's simulator differs from measured logs.
 
-  axisight demo                       diagnose a small case that it makes
-  axisight check LOG --robot MODEL    see whether a log and a robot go together
+  axisight demo                       make a small case and diagnose it
+  axisight check LOG --robot MODEL    check that a log and a robot fit together
   axisight diagnose LOG LOG --model MODEL --report report.html
-                                      diagnose your own; MODEL: URDF, MJCF or robot.toml
+                                      diagnose your own logs; MODEL: URDF, MJCF or robot.toml
 
 axisight --help lists all commands."""
 
@@ -119,7 +135,28 @@ def load_command(name: str) -> Any:
         found = alone
     command = typer.main.get_command(found)
     _add_quiet(command, name)
+    _name_values(command)
     return command
+
+
+# What stands for the value of an option in the help, by its type.
+_VALUES = {int: "N", float: "X", str: "TEXT", Path: "PATH"}
+
+
+def _name_values(command: Any) -> None:
+    """Have the help say PATH, N or X for the value of an option, and nothing for a switch."""
+    for part in getattr(command, "commands", {}).values():
+        _name_values(part)
+    if command.callback is None:
+        return
+    hints = get_type_hints(inspect.unwrap(command.callback))
+    for option in command.params:
+        kind = hints.get(option.name)
+        held = {kind, *get_args(kind)}
+        held |= {inner for part in held for inner in get_args(part)}
+        named = [word for one, word in _VALUES.items() if one in held]
+        if option.metavar is None and option.param_type_name == "option":
+            option.metavar = " " if kind is bool else next(iter(named), None)
 
 
 def _add_quiet(command: Any, name: str) -> None:
@@ -143,6 +180,7 @@ def _quiet_option() -> Any:
                 "-q",
                 callback=_be_quiet,
                 expose_value=False,
+                metavar=" ",
                 help="Print errors only; files are written as asked.",
             ),
         ] = False,
@@ -197,8 +235,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-for _name, (_, _help) in _COMMANDS.items():
-    app.command(_name, help=_help)(lambda: None)
+for _name, (_, _group, _help) in _COMMANDS.items():
+    app.command(_name, help=_help, rich_help_panel=_group)(lambda: None)
 
 
 def _show_version(wanted: bool) -> None:
@@ -212,14 +250,28 @@ def _options(
     ctx: typer.Context,
     version: Annotated[
         bool,
-        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
+        typer.Option(
+            "--version",
+            callback=_show_version,
+            is_eager=True,
+            metavar=" ",
+            help="Show the version.",
+        ),
     ] = False,
     quiet: Annotated[
         bool,
-        typer.Option("--quiet", "-q", help="Print errors only, as after the name of a command."),
+        typer.Option(
+            "--quiet",
+            "-q",
+            metavar=" ",
+            help="Print errors only; also after the name of a command.",
+        ),
     ] = False,
 ) -> None:
-    """Identify industrial robots, simulate them, and explain the sim-to-real gap."""
+    """Find why a robot's simulator differs from measured logs, and correct it.
+
+    `axisight demo` shows a diagnosis; `axisight diagnose CASE` does yours.
+    """
     # Of what only prints there would be nothing.
     _be_quiet(quiet and ctx.invoked_subcommand not in _ONLY_PRINT)
     if ctx.invoked_subcommand is None:

@@ -29,7 +29,7 @@ def check_command(
         str | None,
         typer.Option(
             metavar="MODEL",
-            help="robot.toml, URDF, MJCF or preset: say too what a diagnosis would refuse or doubt.",
+            help="Simulator (robot.toml, URDF, MJCF or a preset): also say what a diagnosis would refuse.",
         ),
     ] = None,
     base: Base = None,
@@ -38,11 +38,16 @@ def check_command(
     untrusted: Untrusted = False,
     max_bytes: MaxBytes = None,
 ) -> None:
-    """Report rate, gaps, NaN, saturation, quantization, suspicious units and constant channels."""
+    """Check a log: rate, gaps, NaN, saturation, quantization, units, constant channels.
+
+    The exit status is 1 where a diagnosis would refuse the log.
+    """
     with errors():
         options = ModelOptions(base, tip, payload)
         if robot is None and options.given():
-            raise InputError(f"{', '.join(options.given())}: expected --robot MODEL beside it")
+            raise InputError(
+                f"{', '.join(options.given())}: expected --robot MODEL beside it, got none"
+            )
         if untrusted:
             check_log_inside(log)
         found = check_log(log, columns, max_bytes=max_bytes)
@@ -50,7 +55,7 @@ def check_command(
         wrong = (item.message for item in found.findings if item.severity == "error")
         near = next(filter(None, map(suggestion, wrong)), None)
         if near is not None:
-            say(f"did you mean {near}?")
+            say(f"Did you mean {near}?")
         fits = found.ok and (robot is None or _fits(robot, options, found, columns, max_bytes))
         if not fits:
             raise typer.Exit(1)
@@ -87,7 +92,7 @@ def _fits(
         if not _told(finding, alone):
             say(f"{'refused' if finding.severity == 'refuse' else 'flagged'}: {finding}")
     if refused(beside.findings):
-        say(f"a diagnosis with {model} would be refused")
+        say(f"refused: axisight diagnose would not take this log with {model}")
         return False
     say(f"beside {model}: {beside.compared}")
     return True

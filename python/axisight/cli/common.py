@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from axisight.cli.panels import ADVANCED, COMPARED, OUTPUT, SIMULATOR
 from axisight.cli.screen import BARS, ERR, OUT, is_output
 from axisight.cli.stopping import exit_status
 from axisight.cli.suggest import suggestion
@@ -20,18 +21,27 @@ from axisight.storage import write_whole
 
 From = Annotated[
     float,
-    typer.Option("--from", metavar="SECONDS", help="Leave out what comes before in each log."),
+    typer.Option(
+        "--from",
+        metavar="SECONDS",
+        rich_help_panel=COMPARED,
+        help="Leave out what comes before in each log.",
+    ),
 ]
 To = Annotated[
     float | None,
     typer.Option(
-        "--to", metavar="SECONDS", help="Leave out what comes after in each log. Default: its end."
+        "--to",
+        metavar="SECONDS",
+        rich_help_panel=COMPARED,
+        help="Leave out what comes after in each log. Default: its end.",
     ),
 ]
 Moving = Annotated[
     bool,
     typer.Option(
         "--moving",
+        rich_help_panel=COMPARED,
         help="Use each log from its first to its last motion, with 0.2 s of rest around.",
     ),
 ]
@@ -39,13 +49,16 @@ AtRests = Annotated[
     bool,
     typer.Option(
         "--cut-at-rests",
-        help="Cut each log where all axes rest for more than 0.5 s: every motion is a run of its own.",
+        rich_help_panel=COMPARED,
+        help="Cut each log where all axes rest for more than 0.5 s; each motion becomes a run.",
     ),
 ]
 Columns = Annotated[
     Path | None,
     typer.Option(
-        help="Column map (TOML) for logs in other formats, or the name of one: axisight columns list."
+        metavar="MAP",
+        help="Column map for logs with other columns or units: a TOML file, or a name out of "
+        "'axisight columns list'.",
     ),
 ]
 
@@ -59,22 +72,24 @@ Model = Annotated[
 Simulated = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Log of your own simulator under the references of a log, or along its motion: one for each "
-        "estimation log, then each validation log (repeatable)."
+        rich_help_panel=SIMULATOR,
+        help="Log of your own simulator (repeatable): one for each estimation log, then one for each "
+        "validation log, with the references or the motion of that log.",
     ),
 ]
 
 
 Validation = Annotated[
     list[Path] | None,
-    typer.Option(help="Log for the final figures only (repeatable). Default: the last log."),
+    typer.Option(help="Validation log, for the figures only (repeatable). Default: the last log."),
 ]
 
 
 CutoffHz = Annotated[
     float | None,
     typer.Option(
-        help="Low-pass on motion and torque in inverse dynamics. Default: chosen from the data."
+        rich_help_panel=COMPARED,
+        help="Low-pass on motion and torque in inverse dynamics (Hz). Default: chosen from the data.",
     ),
 ]
 
@@ -82,7 +97,9 @@ CutoffHz = Annotated[
 Despite = Annotated[
     list[str] | None,
     typer.Option(
-        help="Name of a fault of the logs that is refused: flag it and go on, e.g. rows_missing (repeatable)."
+        metavar="FAULT",
+        rich_help_panel=COMPARED,
+        help="Go on despite a fault of the logs that is refused, by its name: rows_missing (repeatable).",
     ),
 ]
 
@@ -90,13 +107,19 @@ Despite = Annotated[
 MaxBytes = Annotated[
     int | None,
     typer.Option(
-        help="Most memory that reading one log may take, in bytes. Default: by the size of its files."
+        rich_help_panel=ADVANCED,
+        help="Most memory that reading one log may take (bytes). Default: by the size of its files.",
     ),
 ]
 
 
 Force = Annotated[
-    bool, typer.Option("--force", help="Replace files that exist, also what is no earlier result.")
+    bool,
+    typer.Option(
+        "--force",
+        rich_help_panel=OUTPUT,
+        help="Replace existing files of any kind. Without it only earlier results are replaced.",
+    ),
 ]
 
 
@@ -104,7 +127,8 @@ Untrusted = Annotated[
     bool,
     typer.Option(
         "--untrusted",
-        help="What is read is somebody else's: refuse what leads out of its folder.",
+        rich_help_panel=ADVANCED,
+        help="The input comes from somebody else: refuse links and names that leave its folder.",
     ),
 ]
 
@@ -122,7 +146,7 @@ def errors(stopped: str = "stopped; nothing was written") -> Iterator[None]:
         ERR.print(f"[red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True)
         near = suggestion(str(error))
         if near is not None:
-            complain(f"did you mean {near}?")
+            complain(f"Did you mean {near}?")
         raise typer.Exit(2) from None
     except KeyboardInterrupt as stop:
         complain(stopped)

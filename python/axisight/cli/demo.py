@@ -93,8 +93,11 @@ def demo_command(
     out: Annotated[
         Path, typer.Option(help="Folder for the case, the verdict and the report.")
     ] = Path("demo"),
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Print all tables of the diagnosis.")
+    ] = False,
 ) -> None:
-    """Make a small case (a simulated machine with a withheld effect) and diagnose it."""
+    """Make a small case, a simulated machine with an effect that its simulator lacks, and diagnose it."""
     with errors():
         verdict, page = out / "verdict.json", out / "report.html"
         check_targets({"--out, verdict": verdict, "--out, report": page})
@@ -102,5 +105,5 @@ def demo_command(
         say(f"case: {case} (a simulated machine with an effect its simulator lacks)")
         with bars() as progress:
             found = diagnose(case, progress=progress)
-        show_diagnosis(found)
+        show_diagnosis(found, verbose=verbose, given=("--json", "--report"))
         write_each(diagnosis_writes(found, verdict, page))

@@ -32,6 +32,7 @@ from axisight.cli.common import (
 from axisight.cli.experiment import asked_experiment
 from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.outputs import Outputs
+from axisight.cli.panels import ADVANCED, EXPERIMENT, FLEET, OUTPUT, SIMULATOR
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.cli.screen import OUT, is_output
 from axisight.cli.show import show_account, show_diagnosis
@@ -73,7 +74,9 @@ def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
                 f"({own[0]}), got {name!r}"
             )
         if not 0 < changed[name] < 1:
-            raise InputError(f"--tolerance {name}: expected between 0 and 1, got {value}")
+            raise InputError(
+                f"--tolerance {name}: expected a share between 0 and 1 (0.02 for 2 %), got {value}"
+            )
     return changed
 
 
@@ -81,126 +84,171 @@ def diagnose_command(
     case_or_logs: Annotated[
         list[Path] | None,
         typer.Argument(
-            help="A case folder, or logs to fit and choose on; the simulator may stand first."
+            metavar="CASE|LOG",
+            help="A case folder, or estimation logs. The simulator may stand first.",
         ),
     ] = None,
     model: Model = None,
-    base: Base = None,
-    tip: Tip = None,
-    payload: Load = None,
     validation: Validation = None,
     columns: Columns = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="HTML", help="Write the report here.")
+    ] = None,
     json: Annotated[
         Path | None,
         typer.Option(
-            help="Write the verdict here; - is standard output, and all else goes to standard error."
+            help="Write the verdict here as JSON. With - it goes to standard output, all else to "
+            "standard error."
         ),
     ] = None,
-    report: Annotated[Path | None, typer.Option(help="Write the HTML report here.")] = None,
+    write_model: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the simulator with its causes here: robot file (.toml), or URDF or MJCF where "
+            "that was diagnosed."
+        ),
+    ] = None,
+    verbose: Annotated[
+        bool,
+        typer.Option(
+            "--verbose", "-v", help="Print all tables: pooled gap, re-fit, ranking, limits."
+        ),
+    ] = False,
+    explain: Annotated[
+        bool,
+        typer.Option(
+            "--explain",
+            rich_help_panel=OUTPUT,
+            help="Also print how the verdict came about: comparisons, rules, rivals, moves.",
+        ),
+    ] = False,
+    signals: Annotated[
+        Path | None,
+        typer.Option(
+            rich_help_panel=OUTPUT,
+            help="Write measured and simulated torques of all logs, before and after: .parquet or .mcap.",
+        ),
+    ] = None,
+    exit_code: Annotated[
+        bool,
+        typer.Option(
+            "--exit-code",
+            rich_help_panel=OUTPUT,
+            help="Exit with the verdict: 0 none, 10 explained, 11 unknown, 12 undecidable. Without it 0.",
+        ),
+    ] = False,
+    force: Force = False,
+    start_s: From = 0.0,
+    stop_s: To = None,
+    moving: Moving = False,
+    cut_at_rests: AtRests = False,
+    cutoff_hz: CutoffHz = None,
+    despite: Despite = None,
+    effect: GivenEffects = None,
     tolerance: Annotated[
         list[str] | None,
         typer.Option(
-            help="Relative tolerance of a simulator parameter, e.g. mass=0.02, instead of that of "
-            "the robot file or the default; of gains of a controller of targets too, e.g. kp=0.5."
+            metavar="NAME=SHARE",
+            rich_help_panel=SIMULATOR,
+            help="Tolerance of an own parameter, as mass=0.02, or of a gain, as kp=0.5 (repeatable). "
+            "Default: that of the robot file.",
         ),
     ] = None,
-    cutoff_hz: CutoffHz = None,
-    despite: Despite = None,
-    max_causes: Annotated[
-        int, typer.Option(min=0, help="Stop after so many causes.")
-    ] = Settings.max_causes,
-    threads: Annotated[
-        int | None, typer.Option(min=1, help="Candidates tried at a time. Default: all cores.")
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Rules every random choice.")] = 0,
-    effect: GivenEffects = None,
+    base: Base = None,
+    tip: Tip = None,
+    payload: Load = None,
     simulated: Simulated = None,
     next_experiment: Annotated[
         Path | None,
         typer.Option(
-            help="Design the experiment that tells the causes apart which stay open, and write its "
-            "references into this folder: of logs in closed loop with velocity references, no others.",
+            metavar="FOLDER",
+            rich_help_panel=EXPERIMENT,
+            help="Design the motion that tells open causes apart, and write its references here. Needs "
+            "closed-loop logs with velocity references.",
         ),
     ] = None,
     to_show: Annotated[
         str | None,
         typer.Option(
-            metavar="EFFECT@AXIS PARAM=VALUE",
-            help="The experiment is to show this effect, of this size, if the machine has it.",
+            metavar="'NAME@AXIS PARAM=VALUE'",
+            rich_help_panel=EXPERIMENT,
+            help="The motion shall show this effect, of this size, if the machine has it.",
         ),
     ] = None,
     velocity_limit: Annotated[
         str | None,
         typer.Option(
             metavar="VALUE,...",
-            help="Of each motor or all (rad/s) in the experiment. Default: what the logs show.",
+            rich_help_panel=EXPERIMENT,
+            help="Velocity limit of each motor, or of all (rad/s). Default: what the logs reach.",
         ),
     ] = None,
     travel_limit: Annotated[
         str | None,
         typer.Option(
             metavar="VALUE,...",
-            help="How far each motor or all may turn in the experiment, either way (rad). Default: what the logs show.",
+            rich_help_panel=EXPERIMENT,
+            help="Travel of each motor, or of all, either way (rad). Default: what the logs reach.",
         ),
     ] = None,
     torque_limit: Annotated[
         str | None,
         typer.Option(
             metavar="VALUE,...",
-            help="Of each motor or all (Nm) in the experiment. Default: what the logs show.",
+            rich_help_panel=EXPERIMENT,
+            help="Torque limit of each motor, or of all (Nm). Default: what the logs reach.",
         ),
     ] = None,
-    write_model: Annotated[
-        Path | None,
-        typer.Option(
-            help="Write the simulator with its causes, and with gains of targets that were re-fitted, here: a "
-            "robot file (.toml), or a URDF or MJCF as the "
-            "one that was diagnosed."
-        ),
-    ] = None,
-    signals: Annotated[
-        Path | None,
-        typer.Option(
-            help="Write measured and simulated torques of all logs, before and after, here: .parquet or .mcap."
-        ),
-    ] = None,
-    explain: Annotated[
-        bool,
-        typer.Option(
-            "--explain",
-            help="Say how the verdict came about: what was compared, what each rule added, why rivals lost, "
-            "what each move did.",
-        ),
-    ] = False,
-    force: Force = False,
-    exit_code: Annotated[
-        bool,
-        typer.Option(
-            "--exit-code",
-            help="Exit with the verdict: 0 none, 10 explained, 11 unknown, 12 undecidable. Without it 0.",
-        ),
-    ] = False,
-    untrusted: Untrusted = False,
-    max_bytes: MaxBytes = None,
-    start_s: From = 0.0,
-    stop_s: To = None,
-    moving: Moving = False,
-    cut_at_rests: AtRests = False,
     fleet: Annotated[
         Path | None,
-        typer.Option(help="Diagnose every case below this folder, into --out, case by case."),
+        typer.Option(
+            metavar="FOLDER", rich_help_panel=FLEET, help="Diagnose every case below this folder."
+        ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for a fleet's verdicts, table and page.")
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            rich_help_panel=FLEET,
+            help="Folder for the verdicts, the table and the page.",
+        ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes of a fleet here. Default: all processors.")
+        int | None,
+        typer.Option(
+            min=1, rich_help_panel=FLEET, help="Processes on this machine. Default: all cores."
+        ),
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(help="Dask scheduler whose workers diagnose a fleet.")
+        str | None,
+        typer.Option(
+            rich_help_panel=FLEET,
+            help="Dask scheduler, as tcp://10.0.0.1:8786, whose workers diagnose.",
+        ),
     ] = None,
+    max_causes: Annotated[
+        int, typer.Option(min=0, rich_help_panel=ADVANCED, help="Stop after this many causes.")
+    ] = Settings.max_causes,
+    seed: Annotated[
+        int, typer.Option(min=0, rich_help_panel=ADVANCED, help="Seed of every random choice.")
+    ] = 0,
+    threads: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            rich_help_panel=ADVANCED,
+            help="Hypotheses that are tried at a time. Default: all cores.",
+        ),
+    ] = None,
+    untrusted: Untrusted = False,
+    max_bytes: MaxBytes = None,
 ) -> None:
-    """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks."""
+    """Find why the simulator differs from the logs: which causes, of what size, how sure.
+
+    axisight diagnose CASE --report report.html
+
+    axisight diagnose LOG LOG --model robot.urdf --columns map.toml
+    """
     if fleet is not None:
         for_one = {
             "a case or logs": case_or_logs,
@@ -225,6 +273,7 @@ def diagnose_command(
             "--signals": signals,
             "--simulated": simulated,
             "--explain": explain,
+            "--verbose": verbose,
             "--force": force,
             "--exit-code": exit_code,
             "--untrusted": untrusted,
@@ -243,10 +292,16 @@ def diagnose_command(
         OUT.leave_output()
     with errors():
         if not case_or_logs:
-            raise InputError("expected a case folder or logs, or --fleet FOLDER, got nothing")
+            raise InputError(
+                "CASE or LOG...: expected a case folder or logs, or --fleet FOLDER, got nothing; "
+                "'axisight demo' makes a case"
+            )
         if out or workers or scheduler:
-            raise InputError("--out, --workers, --scheduler: expected with --fleet only")
-        asked = asked_experiment(
+            raise InputError(
+                "--out, --workers, --scheduler: expected --fleet FOLDER beside them, got none; files of "
+                "one diagnosis go to --report and --json"
+            )
+        experiment_on = asked_experiment(
             next_experiment, to_show, velocity_limit, travel_limit, torque_limit
         )
         options = ModelOptions(base, tip, payload)
@@ -263,6 +318,7 @@ def diagnose_command(
             untrusted=untrusted,
             max_bytes=max_bytes,
         )
+        asked = None if experiment_on is None else experiment_on(inputs.robot)
         outputs = Outputs(
             json, report, write_model, signals, next_experiment, to_show is not None, force
         )
@@ -290,7 +346,7 @@ def diagnose_command(
                 signals=signals is not None,
                 simulated=inputs.simulated,
             )
-        show_diagnosis(found)
+        show_diagnosis(found, verbose=verbose, given=outputs.given())
         if explain:
             show_account(found)
         write_each(outputs.writes(found, inputs, options))

@@ -10,7 +10,14 @@ import typer
 
 from axisight.cli.common import complain, errors, numbers, one_or_each, say
 from axisight.cli.model_options import Base, Load, ModelOptions, Tip
-from axisight.cli.robot import GivenEffects, parse_effects, say_effects, say_import, with_given
+from axisight.cli.robot import (
+    GivenEffects,
+    effects_on,
+    parse_effects,
+    say_effects,
+    say_import,
+    with_given,
+)
 from axisight.cli.screen import OUT
 from axisight.errors import InputError
 from axisight.excitation import Excited, excite, load_design, read_design, write_references
@@ -100,8 +107,9 @@ def excite_command(
         top = {"robot": robot, "directions": directions, "dc_level_rad_s": dc_level_rad_s}
         data |= {name: value for name, value in top.items() if value is not None}
         checked = read_design(data, "options" if design is None else str(design))
-        given = parse_effects(effect)
+        texts = parse_effects(effect)
         machine = ModelOptions(base, tip, payload).load(checked.robot)
+        given = effects_on(machine, texts)
         if is_model_file(checked.robot):
             say_import(machine)
         # Without limits or a controller nothing is simulated.

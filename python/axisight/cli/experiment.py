@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from axisight.cli.common import one_or_each
@@ -9,6 +10,7 @@ from axisight.cli.robot import parse_effect
 from axisight.errors import InputError
 from axisight.gap import ExperimentLimits
 from axisight.gap.separate.asked import Asked
+from axisight.robot import Robot
 
 
 def asked_experiment(
@@ -17,8 +19,8 @@ def asked_experiment(
     velocity_limit: str | None,
     travel_limit: str | None,
     torque_limit: str | None,
-) -> Asked | None:
-    """Return the experiment that goes into a folder; None without one.
+) -> Callable[[Robot], Asked] | None:
+    """Return what makes the experiment of a robot that goes into a folder; None without a folder.
 
     Raises InputError, naming the option, for options of an experiment that nobody asks for, and for
     what is no effect or no number.
@@ -32,7 +34,7 @@ def asked_experiment(
     if folder is None:
         for option, given in options.items():
             if given is not None:
-                raise InputError(f"{option}: expected with --next-experiment FOLDER only")
+                raise InputError(f"{option}: expected --next-experiment FOLDER beside it, got none")
         return None
     limits = ExperimentLimits(
         velocity_rad_s=one_or_each("--velocity-limit", velocity_limit),
@@ -40,4 +42,4 @@ def asked_experiment(
         torque_nm=one_or_each("--torque-limit", torque_limit),
     )
     effect = None if to_show is None else parse_effect(to_show, "--to-show")
-    return Asked(effect, limits)
+    return lambda robot: Asked(None if effect is None else effect.on(robot), limits)

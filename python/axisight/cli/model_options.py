@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from axisight.cli.panels import SIMULATOR
 from axisight.errors import InputError
 from axisight.robot import Robot, load_robot
 from axisight.robot_import import import_robot, is_model_file
@@ -15,13 +16,18 @@ from axisight.robot_import.drives import DriveData, Payload
 from axisight.robot_import.load import drive_data
 
 Base = Annotated[
-    str | None, typer.Option(help="Of a model file: link that stands still. Default: the root.")
+    str | None,
+    typer.Option(
+        rich_help_panel=SIMULATOR,
+        help="Link of a model file that stands still. Default: the root.",
+    ),
 ]
 Tip = Annotated[
     str | None,
     typer.Option(
-        help="Of a model file: last link of the chain; other moving branches are locked at zero. Default: the "
-        "end of the only moving branch."
+        rich_help_panel=SIMULATOR,
+        help="Last link of the chain of a model file; other branches are locked at zero. Default: the end "
+        "of the only moving branch.",
     ),
 ]
 Load = Annotated[
@@ -29,7 +35,8 @@ Load = Annotated[
     typer.Option(
         "--payload",
         metavar="KG[,X,Y,Z]",
-        help="On a model file, load mounted by hand: mass, and its centre in the frame of the last link [m].",
+        rich_help_panel=SIMULATOR,
+        help="Load on the last link of a model file: mass, and its centre in the frame of that link (m).",
     ),
 ]
 

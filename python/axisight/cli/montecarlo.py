@@ -16,7 +16,7 @@ from rich.table import Table
 
 from axisight import montecarlo
 from axisight.cli.common import errors, say
-from axisight.cli.robot import GivenEffects, parse_effects, say_effects
+from axisight.cli.robot import GivenEffects, effects_on, parse_effects, say_effects
 from axisight.cli.screen import BARS, OUT
 from axisight.effects import Effect
 from axisight.errors import StudyError
@@ -52,9 +52,12 @@ def montecarlo_command(
 ) -> None:
     """Run a Monte Carlo study; the same study and seed give the same bits, however it is run."""
     with errors(f"stopped; finished blocks are in {out}, go on with --resume"):
-        design = _with_given(montecarlo.read_study(study), parse_effects(effect))
+        texts = parse_effects(effect)
+        design = montecarlo.read_study(study)
+        robot = load_robot(design.robot)
+        design = _with_given(design, effects_on(robot, texts))
         given = [Effect(**entry.model_dump()) for entry in design.effect]
-        say_effects(load_robot(design.robot), design.robot, given)
+        say_effects(robot, design.robot, given)
         changes = {"runs": runs, "seed": seed}
         design = design.changed(**{k: v for k, v in changes.items() if v is not None})
         if design.runs > _UNASKED and not yes:

@@ -45,6 +45,17 @@ class Outputs:
     to_show: bool
     force: bool
 
+    def given(self) -> list[str]:
+        """Return the options that were given, each of which says a line once its file is written."""
+        files = {
+            "--json": None if is_output(self.json) else self.json,
+            "--report": self.report,
+            "--write-model": self.model,
+            "--signals": self.signals,
+            "--next-experiment": self.next_experiment,
+        }
+        return [option for option, path in files.items() if path is not None]
+
     def check(self, inputs: Inputs, read: Sequence[Path]) -> None:
         """Refuse targets that cannot be written, or that would replace what the user has.
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from axisight.arguments import axis_number
 from axisight.cli.common import numbers, say
 from axisight.cli.model_options import AS_IT_IS, ModelOptions
-from axisight.effects import Effect
+from axisight.cli.panels import SIMULATOR
+from axisight.cli.suggest import nearest
+from axisight.effects import Effect, effect_info, effect_table
 from axisight.errors import InputError
 from axisight.robot import Robot
 from axisight.robot_file import refuse_effects_beside
@@ -22,16 +26,17 @@ GivenEffects = Annotated[
     typer.Option(
         "--effect",
         metavar="'NAME@AXIS PARAM=VALUE ...'",
-        help="Effect that the simulator has too (repeatable), e.g. 'coulomb_friction@2 "
-        "coulomb_nm=0.4'; the whole arm without @AXIS, two axes as @5,6, neutral values for "
-        "parameters left out. It takes the place of one of the robot of that name and axis.",
+        rich_help_panel=SIMULATOR,
+        help="Add an effect to the simulator (repeatable), e.g. 'coulomb_friction@2 coulomb_nm=0.4'. "
+        "AXIS is a number or a joint name, two as @5,6; leave it out for the whole arm. "
+        "It replaces an effect of the same name and axis.",
     ),
 ]
 
 
 def load_simulator(
     source: Path | str,
-    given: Sequence[Effect] = (),
+    given: Sequence[GivenEffect] = (),
     *,
     options: ModelOptions = AS_IT_IS,
     sample_time_s: float | None = None,
@@ -44,8 +49,9 @@ def load_simulator(
     robot = options.load(source, sample_time_s=sample_time_s)
     if is_model_file(source):
         say_import(robot)
-    say_effects(robot, source, given)
-    return with_given(robot, given)
+    effects = effects_on(robot, given)
+    say_effects(robot, source, effects)
+    return with_given(robot, effects)
 
 
 def say_import(robot: Robot) -> None:
@@ -83,43 +89,89 @@ def say_effects(robot: Robot, source: Path | str, given: Iterable[Effect] = ()) 
         say(f"with the effects of {source}: {', '.join(acting)}")
 
 
-def parse_effects(texts: Sequence[str] | None) -> list[Effect]:
-    """Return the effects of a repeated ``--effect``; raises InputError as `parse_effect`.
+@dataclass(frozen=True)
+class GivenEffect:
+    """An effect as the command line has it: axes are numbers or joint names that no robot has resolved yet.
 
-    The same effect twice at one place is refused too.
+    ``text`` is what was given to ``option``.
     """
+
+    option: str
+    text: str
+    name: str
+    axes: tuple[str, ...]
+    parameters: Mapping[str, float]
+
+    def on(self, robot: Robot) -> Effect:
+        """Return the effect of a robot; raises InputError quoting option and text."""
+        try:
+            numbered = [axis_number(axis, robot.axis_names) for axis in self.axes]
+            if len(numbered) == 2:
+                return Effect(self.name, None, self.parameters, (numbered[0], numbered[1]))
+            return Effect(self.name, numbered[0] if numbered else None, self.parameters)
+        except InputError as error:
+            raise InputError(f"{self.option} {self.text!r}: {error}") from None
+
+
+def effects_on(robot: Robot, given: Iterable[GivenEffect]) -> list[Effect]:
+    """Return effects on the axes of a robot; raises InputError as `GivenEffect.on`, and for one given twice."""
     found: dict[str, Effect] = {}
-    for text in texts or []:
-        effect = parse_effect(text)
+    for one in given:
+        effect = one.on(robot)
         if effect.label in found:
-            raise InputError(f"--effect {text!r}: expected {effect.label} once, got it twice")
+            raise InputError(
+                f"{one.option} {one.text!r}: expected {effect.label} once, got it twice"
+            )
         found[effect.label] = effect
     return list(found.values())
 
 
-def parse_effect(text: str, option: str = "--effect") -> Effect:
-    """Return the effect that ``NAME@AXIS PARAM=VALUE ...`` describes.
+def parse_effects(texts: Sequence[str] | None) -> list[GivenEffect]:
+    """Return the effects of a repeated ``--effect``; raises InputError as `parse_effect`."""
+    return [parse_effect(text) for text in texts or []]
+
+
+def parse_effect(text: str, option: str = "--effect") -> GivenEffect:
+    """Return the effect that ``NAME@AXIS PARAM=VALUE ...`` describes, its axis not resolved yet.
 
     Axis and parameters may be left out; ``NAME@AXIS:PARAM=VALUE,...`` is read too. Raises
     InputError quoting ``option`` and ``text``.
     """
     head, *rest = re.split(r"[:\s]+", re.sub(r"\s*=\s*", "=", text.strip()), maxsplit=1)
     name, at, place = head.partition("@")
-    axes = place.split(",") if at else []
-    if not all(axis.isdecimal() for axis in axes) or len(axes) > 2:
-        raise InputError(f"{option} {text!r}: expected an axis number after @, got {place!r}")
-    numbered = [int(axis) for axis in axes]
+    axes = tuple(place.split(",")) if at else ()
+    quoted = f"{option} {text!r}"
+    if not all(axes) or len(axes) > 2:
+        raise InputError(f"{quoted}: expected one axis or two after @, got {place!r}")
+    _check_name(name, quoted)
     parameters: dict[str, float] = {}
     for item in re.split(r"[,\s]+", rest[0]) if rest and rest[0] else []:
         key, equals, value = item.partition("=")
         if not equals:
-            raise InputError(f"{option} {text!r}: expected PARAM=VALUE, got {item!r}")
+            raise InputError(f"{quoted}: expected PARAM=VALUE, got {item!r}")
         if key in parameters:
-            raise InputError(f"{option} {text!r}: expected {key} once, got it twice")
-        (parameters[key],) = numbers(f"{option} {text!r}: {key}", value)
-    try:
-        if len(numbered) == 2:
-            return Effect(name, None, parameters, (numbered[0], numbered[1]))
-        return Effect(name, numbered[0] if numbered else None, parameters)
-    except InputError as error:
-        raise InputError(f"{option} {text!r}: {error}") from None
+            raise InputError(f"{quoted}: expected {key} once, got it twice")
+        _check_parameter(name, key, quoted)
+        (parameters[key],) = numbers(f"{quoted}: {key}", value)
+    return GivenEffect(option, text, name, axes, parameters)
+
+
+def _check_name(name: str, quoted: str) -> None:
+    """Raise InputError for a name that is no effect, with the nearest that is one."""
+    if name in effect_table():
+        return
+    near = nearest(name, effect_table())
+    meant = "" if near is None else f" Did you mean {near!r}?"
+    raise InputError(f"{quoted}: unknown effect {name!r}.{meant} 'axisight effects' lists all.")
+
+
+def _check_parameter(effect: str, key: str, quoted: str) -> None:
+    """Raise InputError for a parameter that the effect does not have."""
+    known = [p.name for p in effect_info(effect).parameters]
+    if key in known:
+        return
+    near = nearest(key, known)
+    meant = "" if near is None else f" Did you mean {near!r}?"
+    raise InputError(
+        f"{quoted}: unknown parameter {key!r}.{meant} {effect} has {', '.join(known)}."
+    )

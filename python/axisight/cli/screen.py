@@ -25,6 +25,11 @@ class Screen:
         if not self._quiet:
             self._console.print(*what, **how)
 
+    @property
+    def width(self) -> int:
+        """Columns of a line."""
+        return self._console.width
+
     def begin(self) -> None:
         """Be as at the start of a command."""
         self._console, self._quiet, BARS.quiet = self._standard, False, False

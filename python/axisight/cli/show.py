@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
 from axisight.cli.common import say
 from axisight.cli.screen import OUT
+from axisight.cli.summary import next_steps, summary
 from axisight.gap import Diagnosis, Gap, Interval, Where
 from axisight.gap.facts.axis_names import own_name
 from axisight.gap.facts.compared_quantity import (
@@ -25,6 +28,8 @@ from axisight.report.limits import limit_table
 
 _RANKED = 8
 _REFITTED = 10
+# A smaller change of a parameter reads as +0 %.
+_SEEN = 5e-4
 # Axes of a table of detection limits.
 _PLACES = 7
 
@@ -36,8 +41,24 @@ def show_account(found: Diagnosis) -> None:
         say(line)
 
 
-def show_diagnosis(found: Diagnosis) -> None:
-    """Print verdict, causes with values, the gap, what remains, and what to do next."""
+def show_diagnosis(found: Diagnosis, *, verbose: bool = False, given: Collection[str] = ()) -> None:
+    """Print a diagnosis in 25 lines, or all tables with ``verbose``.
+
+    ``given``: options of files that are written, which need not be offered.
+    """
+    if verbose:
+        _show_all(found)
+        say(f"next: {' '.join(next_steps(found, given))}")
+        return
+    first, *rest = summary(found, OUT.width, given)
+    OUT.print(f"[bold]{escape(found.verdict)}[/]", end="")
+    say(first.removeprefix(found.verdict))
+    for line in rest:
+        say(line)
+
+
+def _show_all(found: Diagnosis) -> None:
+    """Print verdict, causes, the gap by axis and pooled, what remains, the re-fit and the ranking."""
     OUT.print(f"[bold]{escape(found.verdict)}[/]: ", end="")
     say(found.headline)
     if found.causes:
@@ -50,10 +71,9 @@ def show_diagnosis(found: Diagnosis) -> None:
     _show_places(found)
     for finding in found.findings:
         say(f"finding: {finding}")
-    if found.next_experiment is not None:
-        say(f"next experiment: {found.next_experiment}")
-    if found.refit:
-        OUT.print(_refitted(found.refit))
+    changed = {k: p for k, p in found.refit.items() if abs(p.value) >= _SEEN}
+    if changed:
+        OUT.print(_refitted(changed))
     if found.ranking:
         OUT.print(_ranking(found))
     # What could be there all the same is the other half of finding nothing.
@@ -117,7 +137,7 @@ def _causes(found: Diagnosis) -> Table:
 
 
 def _gaps(found: Diagnosis) -> Table:
-    table = Table("axis", "verdict", "gap before", "re-fitted", "after", "noise alone")
+    table = Table("axis", "verdict", "gap before", "re-fitted", "after", "floor")
     gap = found.gap
     for i, verdict, row in found.axis_rows():
         table.add_row(str(i), verdict, *(_percent(x) for x in row))

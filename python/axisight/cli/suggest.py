@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
@@ -28,12 +29,17 @@ _MOST_FILES = 10_000
 
 
 def suggestion(message: str) -> str | None:
-    """Return the name that was meant where an error says that one is not there; None where none is near."""
+    """Return the name that was meant where an error says that one is not there; None where none is near.
+
+    None too where the message makes a suggestion itself.
+    """
     message = message[:_LONGEST]
+    if "did you mean" in message.lower():
+        return None
     for pattern in _CHOICES:
         if found := pattern.search(message):
             known = re.split(r",\s*|\s+or\s+", found["known"])
-            near = _nearest(found["got"], [name.strip("'\"` ") for name in known])
+            near = nearest(found["got"], [name.strip("'\"` ") for name in known])
             if near is not None:
                 return near
     for pattern in _FILES:
@@ -50,11 +56,11 @@ def _file_beside(path: Path) -> str | None:
         names = [entry.name for entry in islice(path.parent.iterdir(), _MOST_FILES)]
     except (OSError, ValueError):
         return None
-    near = _nearest(path.name, [name for name in names if not name.startswith(".")])
+    near = nearest(path.name, [name for name in names if not name.startswith(".")])
     return None if near is None else str(path.with_name(near))
 
 
-def _nearest(name: str, known: list[str]) -> str | None:
+def nearest(name: str, known: Iterable[str]) -> str | None:
     """Return the known name most like ``name``; none that would not show as it is."""
     near = get_close_matches(name, [x for x in known if x.isprintable()], n=1, cutoff=0.7)
     return near[0] if near else None

@@ -1,0 +1,246 @@
+"""A diagnosis in at most 25 lines of text: verdict, causes, gap by axis, findings that matter, next step."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+from axisight.gap import Diagnosis, Finding
+from axisight.gap.facts.axis_names import axis_label
+from axisight.gap.facts.compared_quantity import FROM_POSITIONS, torque_of
+from axisight.gap.facts.result import Cause
+from axisight.gap.facts.wording import LARGEST, percent
+from axisight.gap.intake.user_simulator import said
+from axisight.gap.verdict.headline import in_order
+
+MOST_LINES = 25
+"""Lines of a summary, with the lines that name the files written after it."""
+# Longer lines are hard to read; narrower screens fold the tables.
+_WIDEST, _NARROWEST = 100, 60
+# Findings that rarely change what to do; they are told last.
+_MINOR = ("parameter_at_edge", "effect_within_scatter", "position_noise_large")
+_GROUPS = 2
+
+
+@dataclass(frozen=True)
+class _Detail:
+    """How much of each section is told; ``parameters``, ``axes`` and ``causes``: at most so many rows."""
+
+    parameters: int = 99
+    places: int = 2
+    findings: int = 3
+    axes: int = 99
+    causes: int = 99
+    blanks: bool = True
+
+
+# Tried in turn until the lines are few enough: what is lost first matters least.
+_DETAILS = (
+    _Detail(),
+    _Detail(blanks=False),
+    _Detail(blanks=False, parameters=1),
+    _Detail(blanks=False, parameters=1, places=1, findings=1),
+    _Detail(blanks=False, parameters=1, places=0, findings=0),
+    *(
+        _Detail(blanks=False, parameters=1, places=0, findings=0, axes=6, causes=n)
+        for n in range(15, 2, -1)
+    ),
+)
+
+
+def summary(found: Diagnosis, width: int, given: Collection[str] = ()) -> list[str]:
+    """Return the lines of a diagnosis for a screen of ``width`` columns, the verdict first.
+
+    ``given``: options of files that are written anyway, each with a line of its own later.
+    """
+    width = min(max(width, _NARROWEST), _WIDEST)
+    most = MOST_LINES - len(given)
+    lines: list[str] = []
+    for detail in _DETAILS:
+        sections = [part(found, width, detail) for part in _SECTIONS]
+        sections.append(_folded("next: " + " ".join(next_steps(found, given)), width))
+        between = [""] if detail.blanks else []
+        lines = []
+        for section in filter(None, sections):
+            lines += [*(between if lines else []), *section]
+        if len(lines) <= most:
+            break
+    return lines
+
+
+def next_steps(found: Diagnosis, given: Collection[str] = ()) -> list[str]:
+    """Return what to do with a diagnosis, in sentences; nothing of options that were ``given``."""
+    out = [] if found.next_experiment is None else [found.next_experiment]
+    offers = {
+        "--next-experiment": "--next-experiment FOLDER designs the motions that tell the causes apart.",
+        "--write-model": f"--write-model FILE writes the simulator with {_them(found)}.",
+        "--report": "--report report.html draws where the gap lies.",
+    }
+    if found.verdict != "undecidable" or not _can_be_designed(found):
+        del offers["--next-experiment"]
+    if not found.causes:
+        del offers["--write-model"]
+    if found.verdict == "none":
+        return [*out, "nothing to correct. --verbose lists what these logs would not have shown."]
+    told = [text for option, text in offers.items() if option not in given]
+    if found.verdict == "explained" and not told:
+        told = ["diagnose again with the model that was written; the verdict should be none."]
+    if found.verdict == "unknown":
+        told.append("--explain says what was tried.")
+    return [*out, *told]
+
+
+def _can_be_designed(found: Diagnosis) -> bool:
+    return found.mode == "closed_loop" and found.gap.compared == "torques"
+
+
+def _them(found: Diagnosis) -> str:
+    return "this cause" if len(found.causes) == 1 else "these causes"
+
+
+def _verdict(found: Diagnosis, width: int, _detail: _Detail) -> list[str]:
+    return _folded(f"{found.verdict}: {found.headline}", width, indent="")
+
+
+def _causes(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
+    causes = in_order(found.causes)
+    rows = [("cause", "parameter", "value", "95 % interval", "probability")]
+    for cause in causes[: detail.causes]:
+        rows += _cause(cause, detail.parameters)
+    out = _columns(rows, width) if causes else []
+    if len(causes) > detail.causes:
+        out.append(f"and {len(causes) - detail.causes} more causes: --verbose lists all")
+    for group in found.equivalent[:_GROUPS]:
+        out.append(_cut(f"these logs cannot tell apart: {', '.join(group)}", width))
+    return out
+
+
+def _cause(cause: Cause, most: int) -> list[tuple[str, ...]]:
+    """Return a row for each of the first parameters of a cause, its name in the first row."""
+    rows = []
+    for name, p in list(cause.parameters.items())[:most]:
+        unit = cause.units.get(name, "1")
+        value = f"{p.value:.4g}" if unit == "1" else f"{p.value:.4g} {unit}"
+        rows.append(["", name, value, f"{p.low:.4g} to {p.high:.4g}", ""])
+    rows = rows or [["", "", "", "", ""]]
+    rows[0][0], rows[0][-1] = cause.label, f"{cause.probability:.3f}"
+    return [tuple(row) for row in rows]
+
+
+def _gaps(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
+    gap, rows = found.gap, found.axis_rows()
+    head = f"gap, % of the {torque_of(gap.compared)}"
+    table = [(head, "before", "re-fitted", "after", "floor", "verdict")]
+    shown = rows
+    if len(rows) > detail.axes:
+        largest = sorted(rows, key=lambda row: _excess(row[2]), reverse=True)[: detail.axes]
+        shown = sorted(largest)
+    for i, verdict, stages in shown:
+        table.append((f"axis {axis_label(i, found.joints)}", *map(_share, stages), verdict))
+    if len(rows) > 1:
+        whole = (gap.before, gap.refitted, gap.after, gap.floor)
+        table.append(("all axes", *map(_share, whole), found.verdict))
+    out = _columns(table, width, right=range(1, 5))
+    if len(shown) < len(rows):
+        out.append(f"and {len(rows) - len(shown)} more axes, with less of a gap: --verbose")
+    return out + [line for text in _basis(found) for line in _folded(text, width)]
+
+
+def _excess(stages: Sequence[float]) -> float:
+    """Return the squared gap of an axis above its floor; what is no number comes first."""
+    before, _, _, floor = stages
+    return before**2 - floor**2 if math.isfinite(before) else math.inf
+
+
+def _basis(found: Diagnosis) -> list[str]:
+    """Return what the figures rest on where that was chosen, or is not the robot file alone."""
+    out = []
+    cutoff_hz = found.provenance.get("cutoff_hz")
+    if cutoff_hz is not None:
+        out.append(f"compared by inverse dynamics, below {cutoff_hz:.3g} Hz (--cutoff-hz)")
+    if found.gap.compared == "positions":
+        out.append(f"compared: {FROM_POSITIONS}")
+    if found.simulator is not None:
+        out.append(said(found.simulator, found.gap.compared))
+    return out
+
+
+def _places(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
+    """Return where the rest of the gap lies; only where causes leave something to find."""
+    left = found.remainder
+    if found.verdict != "unknown" or left is None:
+        return []
+    out = [
+        _cut(f"remains on axis {place.axis}: {place.evidence}", width)
+        for place in left.where[: detail.places]
+    ]
+    if out and left.varies_with is not None:
+        out[0] = _cut(f"{out[0]}; it varies with {left.varies_with}", width)
+    return out
+
+
+def _findings(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
+    findings = sorted(found.findings, key=_is_minor)
+    if not findings:
+        return []
+    if not detail.findings:
+        count = "1 finding" if len(findings) == 1 else f"{len(findings)} findings"
+        return [f"{count}: --verbose shows {'it' if len(findings) == 1 else 'them'}"]
+    whole = [f"finding: {finding}" for finding in findings[: detail.findings]]
+    out = [_cut(line, width) for line in whole]
+    more = len(findings) - len(out)
+    if more:
+        out.append(f"and {more} more: --verbose shows all findings in full")
+    elif out != whole:
+        out.append("--verbose shows findings in full")
+    return out
+
+
+def _is_minor(finding: Finding) -> bool:
+    return finding.name in _MINOR or finding.name.startswith("quantized_")
+
+
+_SECTIONS: tuple[Callable[[Diagnosis, int, _Detail], list[str]], ...] = (
+    _verdict,
+    _causes,
+    _gaps,
+    _places,
+    _findings,
+)
+
+
+def _share(x: float) -> str:
+    """Return a share in per cent without its sign, three digits."""
+    if not math.isfinite(x):
+        return "-"
+    return f">{100 * LARGEST:.0f}" if x > LARGEST else percent(x).removesuffix(" %")
+
+
+def _folded(text: str, width: int, indent: str = "  ") -> list[str]:
+    return textwrap.wrap(text, width, subsequent_indent=indent)
+
+
+def _cut(text: str, width: int) -> str:
+    """Return a text on one line, cut between words where it is longer."""
+    return textwrap.shorten(text, width, placeholder=" ...")
+
+
+def _columns(rows: Sequence[Sequence[str]], width: int, right: Collection[int] = ()) -> list[str]:
+    """Return rows as aligned columns; where they are too wide, the first cell stands on a line of its own."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    alone = sum(widths) + 2 * len(widths) - 2 > width
+    out = []
+    for row in rows:
+        cells = [
+            cell.rjust(size) if i in right else cell.ljust(size)
+            for i, (cell, size) in enumerate(zip(row, widths, strict=True))
+        ]
+        if alone:
+            out += [row[0]] if row[0] else []
+            rest = "  ".join(cells[1:]).rstrip()
+            out += [f"  {rest}"] if rest else []
+        else:
+            out.append("  ".join(cells).rstrip())
+    return out
