@@ -28,21 +28,29 @@ blind_app = typer.Typer(
 )
 
 _Workers = Annotated[
-    int | None, typer.Option(min=1, help="Processes here. Default: all processors.")
+    int | None, typer.Option(min=1, help="Processes on this machine. Default: all cores.")
 ]
 
 
 @blind_app.command("make")
 def make_command(
     cases: Annotated[Path, typer.Argument(help="Folder for the cases.")],
-    truth: Annotated[Path, typer.Option(help="Folder for what is withheld, apart from the cases.")],
+    truth: Annotated[Path, typer.Option(help="Folder for the truths, apart from the cases.")],
     count: Annotated[int, typer.Option(min=1, help="Number of cases.")] = 24,
     first: Annotated[int, typer.Option(min=0, help="Number of the first case.")] = 0,
-    seed: Annotated[int, typer.Option(min=0, help="Cases are a function of seed and number.")] = 0,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Seed; a case follows from seed and number.")
+    ] = 0,
     workers: _Workers = None,
-    engine: Annotated[str | None, typer.Option(help="mujoco or pinocchio. Default: drawn.")] = None,
-    arm: Annotated[str | None, typer.Option(help="One of the presets drawn from.")] = None,
-    motions: Annotated[str | None, typer.Option(help="One of the plans drawn from.")] = None,
+    engine: Annotated[
+        str | None, typer.Option(help="mujoco or pinocchio. Default: drawn at random.")
+    ] = None,
+    arm: Annotated[
+        str | None, typer.Option(help="One of the arms. Default: drawn at random.")
+    ] = None,
+    motions: Annotated[
+        str | None, typer.Option(help="One of the motion plans. Default: drawn at random.")
+    ] = None,
 ) -> None:
     """Simulate machines that differ from their simulator, with other engines (extra ``blind``)."""
     with errors(), bars() as progress:
@@ -61,7 +69,7 @@ def make_command(
 @blind_app.command("run")
 def run_command(
     cases: Annotated[Path, typer.Argument(help="Folder of cases.")],
-    out: Annotated[Path, typer.Option(help="Folder for the verdicts; those there already stay.")],
+    out: Annotated[Path, typer.Option(help="Folder for the verdicts; existing ones stay.")],
     workers: _Workers = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Dask scheduler whose workers diagnose the cases.")
@@ -89,13 +97,13 @@ def run_command(
 @blind_app.command("score")
 def score_command(
     cases: Annotated[Path, typer.Argument(help="Folder of cases.")],
-    truth: Annotated[Path, typer.Option(help="Folder of what was withheld.")],
+    truth: Annotated[Path, typer.Option(help="Folder of the truths.")],
     verdicts: Annotated[Path, typer.Option(help="Folder of verdicts.")],
     out: Annotated[Path | None, typer.Option(help="Write the table here (Markdown).")] = None,
     json: Annotated[
-        Path | None, typer.Option(help="Write all of it here; - is standard output.")
+        Path | None, typer.Option(help="Write the score here as JSON; - is standard output.")
     ] = None,
-    html: Annotated[Path | None, typer.Option(help="Write it here as a page.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write the score here as a page.")] = None,
     plots: Annotated[
         Path | None, typer.Option(help="Write confusion.svg and calibration.svg into this folder.")
     ] = None,

@@ -40,7 +40,12 @@ def show_command(name: Annotated[str, typer.Argument(help="Name of a map, as lis
 
 @columns_app.command("guess")
 def guess_command(
-    log: Annotated[Path, typer.Argument(help="Log in any format, by a maker or home-made.")],
+    log: Annotated[
+        Path,
+        typer.Argument(
+            help="Log in any format that is read: CSV, Parquet, MAT, HDF5, NPZ, ROS bag, MCAP."
+        ),
+    ],
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Column map to write. Default: the screen.")
     ] = None,
@@ -48,7 +53,7 @@ def guess_command(
         str | None,
         typer.Option(
             metavar="MODEL",
-            help="robot.toml, URDF, MJCF or preset: number, names and kinds of axes.",
+            help="robot.toml, URDF, MJCF or a preset: gives number, names and kinds of axes.",
         ),
     ] = None,
     force: Force = False,
@@ -82,4 +87,4 @@ def _say_found(out: Path, log: Path, robot: str | None, found: Proposal) -> None
     if found.missing is None:
         say(f"then: {command}")
     else:
-        say(f"then: the map is not complete yet: {found.missing}; after that {command}")
+        say(f"then: complete the map ({found.missing}), and run {command}")

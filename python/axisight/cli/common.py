@@ -193,7 +193,7 @@ def numbers(option: str, text: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
-        raise InputError(f"{option}: expected numbers with commas between, got {text!r}") from None
+        raise InputError(f"{option}: expected numbers separated by commas, got {text!r}") from None
 
 
 def one_or_each(option: str, text: str | None) -> float | list[float] | None:

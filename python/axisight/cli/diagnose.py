@@ -170,7 +170,7 @@ def diagnose_command(
     to_show: Annotated[
         str | None,
         typer.Option(
-            metavar="'NAME@AXIS PARAM=VALUE'",
+            metavar="EFFECT",
             rich_help_panel=EXPERIMENT,
             help="The motion shall show this effect, of this size, if the machine has it.",
         ),

@@ -10,6 +10,7 @@ import typer
 
 from axisight.cli.common import complain, errors, numbers, one_or_each, say
 from axisight.cli.model_options import Base, Load, ModelOptions, Tip
+from axisight.cli.panels import LIMITS, SIGNAL
 from axisight.cli.robot import (
     GivenEffects,
     effects_on,
@@ -29,7 +30,7 @@ from axisight.storage import check_targets, write_bytes
 
 def excite_command(
     design: Annotated[
-        Path | None, typer.Argument(help="Design (TOML); options replace what it says.")
+        Path | None, typer.Argument(help="Design (TOML). Options replace what it says.")
     ] = None,
     out: Annotated[
         Path, typer.Option(help="File to write: .csv (with .design.json), .mat or .parquet.")
@@ -46,40 +47,85 @@ def excite_command(
             help="multisine, chirp, stepped_sine, triangle, prbs or discrete_interval_binary."
         ),
     ] = None,
-    period_s: Annotated[float | None, typer.Option(help="Period (s).")] = None,
+    period_s: Annotated[float | None, typer.Option(help="Length of a period (s).")] = None,
     band_hz: Annotated[
-        str | None, typer.Option(metavar="LOW,HIGH", help="Band of the lines (Hz).")
+        str | None, typer.Option(metavar="LOW,HIGH", help="Lowest and highest frequency (Hz).")
     ] = None,
-    peak_rad_s: Annotated[
-        float | None, typer.Option(help="Largest value (rad/s), motor side.")
+    peak_rad_s: Annotated[float | None, typer.Option(help="Peak motor velocity (rad/s).")] = None,
+    grid: Annotated[
+        str | None,
+        typer.Option(
+            rich_help_panel=SIGNAL, help="Lines that are excited: full, odd, odd_odd or odd_random."
+        ),
     ] = None,
-    grid: Annotated[str | None, typer.Option(help="full, odd, odd_odd or odd_random.")] = None,
-    phases: Annotated[str | None, typer.Option(help="optimized, random or schroeder.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Rules every random choice.")] = None,
-    starts: Annotated[int | None, typer.Option(help="Starts of the search for phases.")] = None,
-    time_s: Annotated[float | None, typer.Option(help="Time for that search (s).")] = None,
-    directions: Annotated[str | None, typer.Option(help="t1, t2, hadamard or dft.")] = None,
+    phases: Annotated[
+        str | None,
+        typer.Option(
+            rich_help_panel=SIGNAL, help="Phases of the lines: optimized, random or schroeder."
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(rich_help_panel=SIGNAL, help="Seed of every random choice.")
+    ] = None,
+    starts: Annotated[
+        int | None, typer.Option(rich_help_panel=SIGNAL, help="Starts of the search for phases.")
+    ] = None,
+    time_s: Annotated[
+        float | None,
+        typer.Option(rich_help_panel=SIGNAL, help="Time limit of the search for phases (s)."),
+    ] = None,
+    directions: Annotated[
+        str | None,
+        typer.Option(
+            rich_help_panel=SIGNAL,
+            help="Directions of the axes by experiment: t1, t2, hadamard or dft.",
+        ),
+    ] = None,
     square: Annotated[
         str | None,
-        typer.Option(metavar="AMPLITUDE,PERIOD", help="Add a square wave (rad/s, s) to all axes."),
+        typer.Option(
+            metavar="AMPLITUDE,PERIOD",
+            rich_help_panel=SIGNAL,
+            help="Add a square wave (rad/s, s) to all axes.",
+        ),
     ] = None,
-    dc_level_rad_s: Annotated[float | None, typer.Option(help="Mean velocity (rad/s).")] = None,
+    dc_level_rad_s: Annotated[
+        float | None, typer.Option(rich_help_panel=SIGNAL, help="Mean velocity (rad/s).")
+    ] = None,
     velocity_limit: Annotated[
-        str | None, typer.Option(metavar="VALUE,...", help="Of each motor or all (rad/s).")
+        str | None,
+        typer.Option(
+            metavar="VALUE,...",
+            rich_help_panel=LIMITS,
+            help="Velocity limit of each motor, or of all (rad/s).",
+        ),
     ] = None,
     acceleration_limit: Annotated[
-        str | None, typer.Option(metavar="VALUE,...", help="Of each motor or all (rad/s^2).")
+        str | None,
+        typer.Option(
+            metavar="VALUE,...",
+            rich_help_panel=LIMITS,
+            help="Acceleration limit of each motor, or of all (rad/s^2).",
+        ),
     ] = None,
     torque_limit: Annotated[
-        str | None, typer.Option(metavar="VALUE,...", help="Of each motor or all (Nm).")
+        str | None,
+        typer.Option(
+            metavar="VALUE,...",
+            rich_help_panel=LIMITS,
+            help="Torque limit of each motor, or of all (Nm).",
+        ),
     ] = None,
     plot: Annotated[
         Path | None,
         typer.Option(
-            help="Also draw the signal here, and the references in NAME-references (.png, .pdf)."
+            help="Draw the signal here, and the references in NAME-references (.png or .pdf)."
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Write in spite of limits.")] = False,
+    force: Annotated[
+        bool,
+        typer.Option("--force", rich_help_panel=LIMITS, help="Write although a limit is exceeded."),
+    ] = False,
     effect: GivenEffects = None,
 ) -> None:
     """Make references for a robot, check them against its limits in simulation, and write them."""
@@ -118,7 +164,9 @@ def excite_command(
         made = excite(checked, with_given(machine, given))
         _show(made)
         if made.report is not None and not made.report.ok and not force:
-            complain("nothing was written; --force writes in spite of limits")
+            complain(
+                "nothing was written: a limit is exceeded (see above); --force writes all the same"
+            )
             raise typer.Exit(1)
         for path in write_references(made.references, out):
             say(f"written: {path}")

@@ -34,9 +34,11 @@ def run_fleet(
     """
     with errors("stopped; finished verdicts stay, run again to go on"):
         if for_one:
-            raise InputError(f"--fleet: expected without {', '.join(for_one)}")
+            raise InputError(
+                f"--fleet: expected no options of a single diagnosis, got {', '.join(for_one)}"
+            )
         if out is None:
-            raise InputError("--out: expected a folder for the verdicts of a fleet")
+            raise InputError("--out: expected a folder for the verdicts of a fleet, got none")
         data, page = out / "fleet.parquet", out / "fleet.html"
         check_targets({"--out, table": data, "--out, page": page})
         check_folder(out / "verdicts")

@@ -10,9 +10,9 @@ import typer
 from numpy.typing import NDArray
 
 import axisight
-from axisight.cli.common import Force, errors, say
+from axisight.arguments import axis_number
+from axisight.cli.common import Columns, Force, errors, say
 from axisight.cli.identify_common import (
-    Columns,
     Out,
     Unchecked,
     band,
@@ -23,6 +23,7 @@ from axisight.cli.identify_common import (
     read_logs,
     write_robot,
 )
+from axisight.cli.panels import EXCITATION, MODEL
 from axisight.errors import InputError
 from axisight.robot import Robot
 
@@ -40,55 +41,103 @@ def axis_command(
         typer.Argument(help="Logs of periodic excitation, from rest, of different amplitudes."),
     ],
     robot: Annotated[
-        str | None, typer.Option(help="robot.toml or a preset: gear ratio, and what --out writes.")
+        str | None,
+        typer.Option(help="robot.toml or a preset: has the gear ratio, and is what --out writes."),
     ] = None,
     gear_ratio: Annotated[
         float | None,
-        typer.Option(help="Joint angle per motor angle, 0.00446 for a 224:1 gear; or --robot."),
+        typer.Option(
+            help="Joint angle per motor angle, 0.00446 for a gear of 224:1. Default: that of --robot."
+        ),
     ] = None,
-    axis: Annotated[int, typer.Option(help="Number of the axis, from 1.")] = 1,
+    axis: Annotated[
+        str,
+        typer.Option(
+            metavar="AXIS", help="Number of the axis, from 1; or a joint name, with --robot."
+        ),
+    ] = "1",
     out: Out = None,
     columns: Columns = None,
     period_s: Annotated[
-        float | None, typer.Option(help="Period of the excitation (s). Default: found.")
+        float | None,
+        typer.Option(
+            rich_help_panel=EXCITATION, help="Period of the excitation (s). Default: found."
+        ),
     ] = None,
     band_hz: Annotated[
         str | None,
         typer.Option(
             metavar="LOW,HIGH",
-            help="Excited lines, all of the period in this band; needs --period-s. Default: found "
-            "from the reference, else from the torque.",
+            rich_help_panel=EXCITATION,
+            help="Band of the excited lines (Hz); needs --period-s. Default: found from the reference, "
+            "else from the torque.",
         ),
     ] = None,
     drop_periods: Annotated[
-        int | None, typer.Option(help="Periods of transient. Default: found.")
+        int | None,
+        typer.Option(
+            rich_help_panel=EXCITATION, help="Periods to drop as transient. Default: found."
+        ),
     ] = None,
-    cutoff_hz: Annotated[float, typer.Option(help="Filter of the slow motion (Hz).")] = 5.0,
+    cutoff_hz: Annotated[
+        float, typer.Option(rich_help_panel=EXCITATION, help="Low-pass on the slow motion (Hz).")
+    ] = 5.0,
     notch_band_hz: Annotated[
-        str | None, typer.Option(metavar="LOW,HIGH", help="Where to look for the notch (Hz).")
+        str | None,
+        typer.Option(
+            metavar="LOW,HIGH",
+            rich_help_panel=EXCITATION,
+            help="Band in which to look for the notch (Hz).",
+        ),
     ] = None,
     plateau_from_hz: Annotated[
-        float | None, typer.Option(help="Where the response is flat from (Hz).")
+        float | None,
+        typer.Option(
+            rich_help_panel=EXCITATION, help="Frequency above which the response is flat (Hz)."
+        ),
     ] = None,
-    masses: Annotated[int, typer.Option(help="2 to 4, the motor included.")] = 2,
+    masses: Annotated[
+        int, typer.Option(rich_help_panel=MODEL, help="Number of masses, 2 to 4, with the motor.")
+    ] = 2,
     stribeck: Annotated[
-        bool, typer.Option("--stribeck", help="Friction that rises to standstill.")
+        bool,
+        typer.Option(
+            "--stribeck", rich_help_panel=MODEL, help="Friction rises towards standstill."
+        ),
     ] = False,
-    backlash: Annotated[bool, typer.Option("--backlash", help="Play in the gear.")] = False,
-    offset: Annotated[bool, typer.Option("--offset", help="Constant torque.")] = False,
+    backlash: Annotated[
+        bool, typer.Option("--backlash", rich_help_panel=MODEL, help="The gear has play.")
+    ] = False,
+    offset: Annotated[
+        bool,
+        typer.Option("--offset", rich_help_panel=MODEL, help="The torque has a constant offset."),
+    ] = False,
     smoothing_rad_s: Annotated[
         float,
-        typer.Option(help="Width of the sign of friction; 0 is the sign itself."),
+        typer.Option(
+            rich_help_panel=MODEL,
+            help="Motor speed over which friction changes sign (rad/s); 0 is a step.",
+        ),
     ] = 0.0,
     fixed: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="Parameter that keeps its initial value (repeatable)."),
+        typer.Option(
+            metavar="NAME",
+            rich_help_panel=MODEL,
+            help="Parameter that keeps its initial value (repeatable).",
+        ),
     ] = None,
     noise_model: Annotated[
-        str, typer.Option(help="output_error, innovations or ar.")
+        str,
+        typer.Option(rich_help_panel=MODEL, help="Noise model: output_error, innovations or ar."),
     ] = "output_error",
     open_loop: Annotated[
-        bool, typer.Option("--open-loop", help="No controller was at work.")
+        bool,
+        typer.Option(
+            "--open-loop",
+            rich_help_panel=MODEL,
+            help="The logs were recorded without a controller.",
+        ),
     ] = False,
     unchecked: Unchecked = False,
     force: Force = False,
@@ -103,15 +152,18 @@ def axis_command(
         check_out(out, [slow, *broadband], columns, force=force)
         machine = None if robot is None else load_source(robot)
         if out is not None and machine is None:
-            raise InputError("--out: expected the robot to write values into, in --robot")
-        ratio = _ratio(machine, gear_ratio, axis)
+            raise InputError(
+                "--out: expected --robot ROBOT, into which the values are written, got none"
+            )
+        number = _number(axis, machine)
+        ratio = _ratio(machine, gear_ratio, number)
         files = [slow, *broadband]
         logs = read_logs(files, columns, machine, unchecked=unchecked)
         found = axisight.graybox.identify_axis(
             logs[0],
             logs[1:],
             gear_ratio=ratio,
-            axis=axis,
+            axis=number,
             model=axisight.graybox.AxisModel(
                 n_masses=masses,
                 gear_ratio=ratio,
@@ -133,7 +185,7 @@ def axis_command(
         )
         say(found.report())
         if machine is not None:
-            against = axisight.graybox.compare_with_robot(found.fit, machine, axis)
+            against = axisight.graybox.compare_with_robot(found.fit, machine, number)
             for text in against.findings:
                 say(f"- {text}")
             if out is not None and against.one_factor and not unchecked:
@@ -142,12 +194,23 @@ def axis_command(
                     "--unchecked)"
                 )
         if out is not None and machine is not None:
-            source = provenance("axis", files, options(ctx), columns)
-            values = axisight.graybox.identified_axis(found.fit, machine, source, axis=axis)
+            source = provenance("axis", files, options(ctx) | {"axis": number}, columns)
+            values = axisight.graybox.identified_axis(found.fit, machine, source, axis=number)
             write_robot(machine, out, values, force=force)
             say(values.provenance.notes)
         if not found.fit.converged:
             raise typer.Exit(1)
+
+
+def _number(axis: str, machine: Robot | None) -> int:
+    """Return the number of an axis, by its joint too where there is a robot."""
+    if machine is not None:
+        return axis_number(axis, machine.axis_names, "--axis")
+    if not axis.isdecimal() or int(axis) < 1:
+        raise InputError(
+            f"--axis: expected a number from 1, or a joint name and the robot in --robot, got {axis!r}"
+        )
+    return int(axis)
 
 
 def _ratio(machine: Robot | None, given: float | None, axis: int) -> float:
@@ -159,9 +222,9 @@ def _ratio(machine: Robot | None, given: float | None, axis: int) -> float:
             )
         return given
     if machine is None:
-        raise InputError("--gear-ratio: expected a number, or --robot that has it, got neither")
-    if not 1 <= axis <= machine.n_axes:
-        raise InputError(f"--axis: expected 1 to {machine.n_axes}, got {axis}")
+        raise InputError(
+            "--gear-ratio: expected joint angle per motor angle, or --robot ROBOT that has it, got neither"
+        )
     # Motor-side data do not show which way the joint turns.
     return abs(float(machine.gear_ratio[axis - 1]))
 
@@ -171,7 +234,7 @@ def _lines(band_hz: str | None, period_s: float | None) -> NDArray[np.int64] | N
     if limits is None:
         return None
     if period_s is None:
-        raise InputError("--band-hz: expected --period-s with it, got none")
+        raise InputError("--band-hz: expected --period-s SECONDS beside it, got none")
     low, high = (round(frequency * period_s) for frequency in limits)
     if not 1 <= low <= high:
         raise InputError(f"--band-hz: expected 0 < LOW <= HIGH, got {band_hz!r}")

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from axisight.cli.common import numbers, say
+from axisight.cli.panels import ADVANCED
 from axisight.errors import InputError, OutputError
 from axisight.gap import RefusedInputError, check_fit_inputs
 from axisight.gap.facts.faults import refused
@@ -28,19 +29,21 @@ from axisight.robot_file import (
 )
 from axisight.storage import check_targets
 
-Columns = Annotated[Path | None, typer.Option(help="Column map (TOML) for logs in other formats.")]
 Out = Annotated[
     Path | None,
     typer.Option(
         "--out",
         "-o",
-        help="Robot file to write; NAME.identified.json beside it has standard errors, data "
-        "and settings.",
+        help="Robot file to write. NAME.identified.json beside it has standard errors, data and settings.",
     ),
 ]
 Unchecked = Annotated[
     bool,
-    typer.Option("--unchecked", help="Take logs in which `axisight check` finds errors."),
+    typer.Option(
+        "--unchecked",
+        rich_help_panel=ADVANCED,
+        help="Take logs in which 'axisight check' finds errors.",
+    ),
 ]
 
 
@@ -76,13 +79,13 @@ def read_logs(
         slides = [kind == "prismatic" for kind in log.axis_kinds]
         if robot is not None and slides != list(robot.axis_is_prismatic):
             raise InputError(
-                f"{path.name}: expected axes that {_kinds(robot.axis_is_prismatic)} as the "
-                f"robot's, got axes that {_kinds(slides)} by their units"
+                f"{path.name}: units: expected axes that {_kinds(robot.axis_is_prismatic)}, as the "
+                f"robot's, got units of axes that {_kinds(slides)}; a column map (--columns) states units"
             )
         logs.append(used.one_of(log))
     found = check_fit_inputs(robot, logs)
     if refused(found) and not unchecked:
-        raise InputError(f"{RefusedInputError(found)} (put it right, or go on with --unchecked)")
+        raise InputError(f"{RefusedInputError(found)} (correct it, or go on with --unchecked)")
     for finding in found:
         if (finding.log, finding.message) not in said and finding.name != "velocity_inconsistent":
             say(f"warning: {finding}")
@@ -99,7 +102,7 @@ def _checked(path: Path, columns: Path | None, *, unchecked: bool) -> set[tuple[
     for finding in check_log(path, columns).findings:
         text = f"{path.name}: {finding.column}: {finding.message}"
         if finding.severity == "error" and not finding.name and not unchecked:
-            raise InputError(f"{text} (put it right in a column map, or go on with --unchecked)")
+            raise InputError(f"{text} (correct it in a column map, or go on with --unchecked)")
         if finding.severity == "warning" or (finding.severity == "error" and not finding.name):
             say(f"{finding.severity}: {f'{finding.name}: ' if finding.name else ''}{text}")
             said.add((path.stem, finding.message))
@@ -179,5 +182,5 @@ def band(option: str, text: str | None) -> tuple[float, float] | None:
         return None
     found = numbers(option, text)
     if len(found) != 2:
-        raise InputError(f"{option}: expected LOW,HIGH, got {text!r}")
+        raise InputError(f"{option}: expected two numbers LOW,HIGH, got {text!r}")
     return found[0], found[1]

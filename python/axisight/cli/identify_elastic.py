@@ -24,6 +24,7 @@ from axisight.cli.identify_common import (
     provenance,
     write_robot,
 )
+from axisight.cli.panels import SEARCH
 from axisight.cli.screen import OUT
 from axisight.effects import effect_info
 from axisight.errors import InputError
@@ -68,23 +69,40 @@ def elastic_command(
     start: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME=VALUE", help="Start of a parameter (repeatable). Default: the robot's."
+            metavar="NAME=VALUE",
+            help="Start value of a parameter (repeatable). Default: that of the robot.",
         ),
     ] = None,
     criterion: Annotated[
         str,
         typer.Option(
-            help="(weighted_)log_least_squares compares logarithms, (weighted_)least_squares values."
+            rich_help_panel=SEARCH,
+            help="(weighted_)log_least_squares compares logarithms, (weighted_)least_squares values.",
         ),
     ] = "weighted_log_least_squares",
     sampling: Annotated[
-        str, typer.Option(help="zero_order_hold, as a sampled loop shows, or continuous.")
+        str,
+        typer.Option(
+            rich_help_panel=SEARCH, help="zero_order_hold, as a sampled loop has it, or continuous."
+        ),
     ] = "zero_order_hold",
     robust: Annotated[
-        bool, typer.Option("--robust", help="Hold back lines that the model misses (Huber).")
+        bool,
+        typer.Option(
+            "--robust",
+            rich_help_panel=SEARCH,
+            help="Give less weight to lines that the model misses (Huber).",
+        ),
     ] = False,
-    starts: Annotated[int, typer.Option(help="Searches, from random starts but the first.")] = 1,
-    seed: Annotated[int, typer.Option(help="Rules the random starts.")] = 0,
+    starts: Annotated[
+        int,
+        typer.Option(
+            rich_help_panel=SEARCH, help="Number of searches; all but the first begin at random."
+        ),
+    ] = 1,
+    seed: Annotated[
+        int, typer.Option(rich_help_panel=SEARCH, help="Seed of the random starts.")
+    ] = 0,
     force: Force = False,
 ) -> None:
     """Stiffness and damping of gears and links from frequency responses at several poses.
@@ -138,8 +156,8 @@ def _responses(
         response = load_netcdf(path)
         if not poses and POSE not in response.attrs:
             raise InputError(
-                f"{path}: expected its operating point, in --at (once per response) or as the "
-                f"attribute {POSE}, got none"
+                f"{path}: operating point: expected --at ANGLE,... once for each response, or the attribute "
+                f"{POSE} of the file, got neither"
             )
         pose = poses[i] if poses else np.atleast_1d(response.attrs[POSE]).tolist()
         if len(pose) != robot.n_axes:

@@ -12,9 +12,8 @@ from rich.markup import escape
 from rich.table import Table
 
 import axisight
-from axisight.cli.common import Force, From, Moving, To, errors, say
+from axisight.cli.common import Columns, Force, From, Moving, To, errors, say
 from axisight.cli.identify_common import (
-    Columns,
     Out,
     Unchecked,
     check_out,
@@ -25,6 +24,7 @@ from axisight.cli.identify_common import (
     read_logs,
     write_robot,
 )
+from axisight.cli.panels import COMPARED, MODEL, OUTPUT, SEARCH
 from axisight.cli.screen import OUT
 from axisight.errors import IdentificationWarning, InputError, RobotError
 from axisight.fitting import robot_parameters
@@ -45,78 +45,109 @@ def rigid_body_command(
     robot: Annotated[
         str,
         typer.Argument(
-            help="robot.toml or a preset: chain, gears, and the values of what motions do not show."
+            help="robot.toml or a preset: chain, gears, and values that the motions do not show."
         ),
     ],
     logs: Annotated[list[Path], typer.Argument(help="Motor logs to fit to.")],
     held_out: Annotated[
         list[Path] | None,
-        typer.Option(help="Log that takes no part, for the torque errors (repeatable)."),
+        typer.Option(help="Log that is left out of the fit, for the torque errors (repeatable)."),
     ] = None,
     out: Out = None,
     columns: Columns = None,
     cutoff_hz: Annotated[
         float,
-        typer.Option(help="Filter (Hz): well above the motion, well below the first resonance."),
+        typer.Option(help="Low-pass (Hz): well above the motion, well below the first resonance."),
     ] = 10.0,
     friction: Annotated[
         str,
         typer.Option(
-            metavar="TERM,...", help="Out of viscous, coulomb, offset, on every motor; or none."
+            metavar="TERM,...",
+            rich_help_panel=MODEL,
+            help="Friction of every motor: some of viscous, coulomb, offset; or none.",
         ),
     ] = "viscous,coulomb,offset",
     rotors: Annotated[
         bool,
         typer.Option(
-            "--rotors/--no-rotors", help="Estimate motor inertias, or hold those of the file."
+            "--rotors/--no-rotors",
+            rich_help_panel=MODEL,
+            help="Estimate motor inertias, or keep those of the file.",
         ),
     ] = True,
     dead_band_rad_s: Annotated[
-        float, typer.Option(help="Motor speed below which Coulomb friction counts as zero.")
+        float,
+        typer.Option(
+            rich_help_panel=MODEL, help="Motor speed below which Coulomb friction is zero (rad/s)."
+        ),
     ] = 0.0,
     reversal_s: Annotated[
         float | None,
         typer.Option(
-            help="Time (s) around each turn of a motor that is left out: the filter smears "
-            "Coulomb friction there. Default: two periods of the cutoff."
+            rich_help_panel=COMPARED,
+            help="Time around each reversal that is left out, because the low-pass smears Coulomb friction "
+            "there (s). Default: two periods of --cutoff-hz.",
         ),
     ] = None,
     torque_measured: Annotated[
         bool,
         typer.Option(
             "--torque-measured",
-            help="The torque is measured at the samples, not a command held from each to the next.",
+            rich_help_panel=COMPARED,
+            help="The torque is a measurement, not a command that is held from sample to sample.",
         ),
     ] = False,
     method: Annotated[
-        str, typer.Option(help="ls, wls (axes weighted by their residuals) or tls.")
+        str,
+        typer.Option(
+            rich_help_panel=SEARCH,
+            help="Least squares: ls, wls (axes weighted by their residuals) or tls (total).",
+        ),
     ] = "wls",
     known: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="Parameter held at a value (repeatable)."),
+        typer.Option(
+            metavar="NAME=VALUE",
+            rich_help_panel=MODEL,
+            help="Parameter held at a value (repeatable).",
+        ),
     ] = None,
     eliminate: Annotated[
         float | None,
-        typer.Option(help="Set to zero what has a larger relative standard error, e.g. 0.3."),
+        typer.Option(
+            rich_help_panel=SEARCH,
+            help="Set parameters to zero whose relative standard error is larger than this, e.g. 0.3.",
+        ),
     ] = None,
     group: Annotated[
         bool,
         typer.Option(
-            "--group", help="Go on with fewer combinations if motions do not separate all."
+            "--group",
+            rich_help_panel=SEARCH,
+            help="Where motions do not separate all parameters, estimate combinations of them.",
         ),
     ] = False,
     consistent: Annotated[
         bool,
         typer.Option(
-            "--consistent", help="Only bodies that can exist, near those in the robot file."
+            "--consistent",
+            help="Only bodies that can exist, near those of the robot file. --out most often needs it.",
         ),
     ] = False,
     combinations: Annotated[
-        bool, typer.Option("--combinations", help="Say what each base parameter is made of.")
+        bool,
+        typer.Option(
+            "--combinations",
+            rich_help_panel=OUTPUT,
+            help="Print what each base parameter is made of.",
+        ),
     ] = False,
     prior_share: Annotated[
         float,
-        typer.Option(help="How near, with --consistent: share of each link's own size."),
+        typer.Option(
+            rich_help_panel=SEARCH,
+            help="With --consistent: how far bodies may be from those of the file, as a share of the link's size.",
+        ),
     ] = 1.0,
     unchecked: Unchecked = False,
     force: Force = False,
@@ -127,8 +158,8 @@ def rigid_body_command(
     """Masses, inertias and friction from logs of motor angles and torques, by regression.
 
     Prints base parameters with standard errors, and torque errors on every log. --out writes a
-    robot file; most often it takes --consistent, since a fit alone may have bodies that cannot exist.
-    The exit status is 1 if these were not found to full accuracy.
+    robot file. It most often needs --consistent: a plain fit may have bodies that cannot exist.
+    The exit status is 1 if such bodies were not found to full accuracy.
     """
     with errors():
         check_out(out, [*logs, *(held_out or [])], columns, force=force)
@@ -170,7 +201,10 @@ def _write(
 ) -> None:
     """Write the robot, or say why not if there are no bodies to write."""
     if found.consistent is not None and found.consistent.status == "failed":
-        say(f"not written: {out}: no bodies that can exist were found")
+        say(
+            f"not written: {out}: no bodies that can exist fit these logs; try more motions, or values of the "
+            "robot file by --known"
+        )
         return
     try:
         write_robot(machine, out, found.identified(source), force=force)

@@ -33,22 +33,27 @@ def montecarlo_command(
     study: Annotated[Path, typer.Argument(help="Study (TOML).")],
     out: Annotated[Path, typer.Option(help="Folder for the results.")],
     runs: Annotated[
-        int | None, typer.Option(help="Number of realizations. Default: the study's.")
+        int | None, typer.Option(help="Number of runs. Default: that of the study.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Default: the study's.")] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(min=0, help="Seed of every random choice. Default: that of the study."),
+    ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the study in the folder, or to more runs.")
+        bool,
+        typer.Option(
+            "--resume", help="Go on with the study that is in the folder, also to more runs."
+        ),
     ] = False,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler, e.g. tcp://10.0.0.1:8786.")
     ] = None,
     threads: Annotated[
-        int | None, typer.Option(min=1, max=1024, help="Threads here. Default: all processors.")
+        int | None,
+        typer.Option(min=1, max=1024, help="Threads on this machine. Default: all cores."),
     ] = None,
     effect: GivenEffects = None,
-    yes: Annotated[
-        bool, typer.Option("--yes", help=f"Run more than {_UNASKED} runs without being asked.")
-    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", help=f"Allow more than {_UNASKED} runs.")] = False,
 ) -> None:
     """Run a Monte Carlo study; the same study and seed give the same bits, however it is run."""
     with errors(f"stopped; finished blocks are in {out}, go on with --resume"):
@@ -62,7 +67,7 @@ def montecarlo_command(
         design = design.changed(**{k: v for k, v in changes.items() if v is not None})
         if design.runs > _UNASKED and not yes:
             takes = estimate(design, threads or available_threads())
-            raise StudyError(f"runs: {takes}: pass --yes to run more than {_UNASKED}")
+            raise StudyError(f"runs: expected at most {_UNASKED} without --yes, got {takes}")
         with _bar() as progress:
             result = montecarlo.run(
                 design,

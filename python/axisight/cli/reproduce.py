@@ -19,20 +19,20 @@ if TYPE_CHECKING:
     from axisight_thesis import Claim
 
 _MISSING = (
-    "the study is a package of its own, axisight_thesis, and is not installed: "
-    "make setup in a checkout, pip install 'axisight[thesis]' elsewhere"
+    "the package axisight_thesis, which holds the study, is not installed: run 'make setup' in a "
+    "checkout, or pip install 'axisight[thesis]'"
 )
 
 
 def reproduce_command(
-    name: Annotated[str, typer.Argument(help="all, one item as table-8.2, or a part as figure-8.")],
+    name: Annotated[
+        str, typer.Argument(help="all, one item (table-8.2), or a part of a name (figure-8).")
+    ],
     out: Annotated[Path, typer.Option(help="Folder for tables, figures and claims.")] = Path(
         "reproduced"
     ),
-    seed: Annotated[int, typer.Option(min=0, help="Rules phases and noise.")] = 0,
-    threads: Annotated[
-        int | None, typer.Option(min=1, help="Threads. Default: all processors.")
-    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of phases and noise.")] = 0,
+    threads: Annotated[int | None, typer.Option(min=1, help="Threads. Default: all cores.")] = None,
     quick: Annotated[
         bool,
         typer.Option(

@@ -25,7 +25,7 @@ GivenEffects = Annotated[
     list[str] | None,
     typer.Option(
         "--effect",
-        metavar="'NAME@AXIS PARAM=VALUE ...'",
+        metavar="EFFECT",
         rich_help_panel=SIMULATOR,
         help="Add an effect to the simulator (repeatable), e.g. 'coulomb_friction@2 coulomb_nm=0.4'. "
         "AXIS is a number or a joint name, two as @5,6; leave it out for the whole arm. "

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from axisight.cli.common import Columns, Force, From, Moving, To, errors, numbers, say
 from axisight.cli.model_options import Base, Load, ModelOptions, Tip
+from axisight.cli.panels import INTEGRATION, SENSOR
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import InputError
 from axisight.excitation.files import holds_references, read_references
@@ -36,8 +37,7 @@ def simulate_command(
     log: Annotated[
         Path,
         typer.Argument(
-            help="Log whose velocity references (or torques) drive the run, "
-            "or references of axisight excite."
+            help="Log whose velocity references or torques drive the run, or references of 'axisight excite'."
         ),
     ],
     out: Annotated[Path, typer.Option(help="Parquet log to write.")],
@@ -46,33 +46,54 @@ def simulate_command(
     tip: Tip = None,
     payload: Load = None,
     torque: Annotated[
-        bool, typer.Option("--torque", help="Drive with the log's torques, without controller.")
+        bool,
+        typer.Option("--torque", help="Drive with the torques of the log, without the controller."),
     ] = False,
     effect: GivenEffects = None,
     start: Annotated[
         str | None,
         typer.Option(
             metavar="ANGLE,...",
-            help="Driven joint angles at rest (rad). Default: the operating point.",
+            help="Driven joint angles at the start (rad). Default: the operating point.",
         ),
     ] = None,
     model: Annotated[
-        str, typer.Option(help=f"Equations of the plant: {' or '.join(get_args(Model))}.")
+        str,
+        typer.Option(
+            rich_help_panel=INTEGRATION,
+            help=f"Equations of the plant: {' or '.join(get_args(Model))}.",
+        ),
     ] = "nonlinear",
     method: Annotated[
-        str, typer.Option(help=f"Integrator: {', '.join(get_args(Method))}.")
+        str,
+        typer.Option(
+            rich_help_panel=INTEGRATION, help=f"Integrator: {', '.join(get_args(Method))}."
+        ),
     ] = "dopri5",
     tolerance: Annotated[
-        float, typer.Option(help="Relative local error; rk4, rkn4 have none.")
+        float,
+        typer.Option(
+            rich_help_panel=INTEGRATION, help="Relative local error; not of rk4 and rkn4."
+        ),
     ] = 1e-7,
-    substeps: Annotated[int, typer.Option(help="Steps per sample of rk4, rkn4.")] = 1,
-    noise_seed: Annotated[int | None, typer.Option(help="Add sensor noise.")] = None,
-    run: Annotated[int, typer.Option(help="Number of the run: another noise per run.")] = 0,
+    substeps: Annotated[
+        int, typer.Option(rich_help_panel=INTEGRATION, help="Steps per sample of rk4 and rkn4.")
+    ] = 1,
+    noise_seed: Annotated[
+        int | None, typer.Option(rich_help_panel=SENSOR, help="Add sensor noise with this seed.")
+    ] = None,
+    run: Annotated[
+        int, typer.Option(rich_help_panel=SENSOR, help="Number of the run; each has its own noise.")
+    ] = 0,
     noise_cutoff_hz: Annotated[
-        float | None, typer.Option(help="Corner of a first-order noise spectrum. Default: white.")
+        float | None,
+        typer.Option(
+            rich_help_panel=SENSOR, help="Corner of a first-order noise spectrum. Default: white."
+        ),
     ] = None,
     resolution: Annotated[
-        float, typer.Option(help="Step of the position sensor (rad), motor side.")
+        float,
+        typer.Option(rich_help_panel=SENSOR, help="Step of the position sensor (rad), motor side."),
     ] = 0.0,
     start_s: From = 0.0,
     stop_s: To = None,

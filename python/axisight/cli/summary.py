@@ -26,13 +26,14 @@ _GROUPS = 2
 
 @dataclass(frozen=True)
 class _Detail:
-    """How much of each section is told; ``parameters``, ``axes`` and ``causes``: at most so many rows."""
+    """How much of each section is told, each at most so many rows; ``blanks``: empty lines between sections."""
 
     parameters: int = 99
     places: int = 2
     findings: int = 3
     axes: int = 99
     causes: int = 99
+    steps: int = 99
     blanks: bool = True
 
 
@@ -42,9 +43,9 @@ _DETAILS = (
     _Detail(blanks=False),
     _Detail(blanks=False, parameters=1),
     _Detail(blanks=False, parameters=1, places=1, findings=1),
-    _Detail(blanks=False, parameters=1, places=0, findings=0),
+    _Detail(blanks=False, parameters=1, places=0, findings=0, steps=1),
     *(
-        _Detail(blanks=False, parameters=1, places=0, findings=0, axes=6, causes=n)
+        _Detail(blanks=False, parameters=1, places=0, findings=0, steps=1, axes=6, causes=n)
         for n in range(15, 2, -1)
     ),
 )
@@ -60,7 +61,7 @@ def summary(found: Diagnosis, width: int, given: Collection[str] = ()) -> list[s
     lines: list[str] = []
     for detail in _DETAILS:
         sections = [part(found, width, detail) for part in _SECTIONS]
-        sections.append(_folded("next: " + " ".join(next_steps(found, given)), width))
+        sections.append(_next(found, given, width, detail))
         between = [""] if detail.blanks else []
         lines = []
         for section in filter(None, sections):
@@ -80,13 +81,14 @@ def next_steps(found: Diagnosis, given: Collection[str] = ()) -> list[str]:
     }
     if found.verdict != "undecidable" or not _can_be_designed(found):
         del offers["--next-experiment"]
-    if not found.causes:
+    if found.verdict == "undecidable" or not found.causes:
         del offers["--write-model"]
     if found.verdict == "none":
-        return [*out, "nothing to correct. --verbose lists what these logs would not have shown."]
+        limits = ["--verbose lists the smallest effects that these logs would show."]
+        return [*out, "Nothing to correct.", *(limits if found.detection_limits else [])]
     told = [text for option, text in offers.items() if option not in given]
     if found.verdict == "explained" and not told:
-        told = ["diagnose again with the model that was written; the verdict should be none."]
+        told = ["Diagnose again with the model that was written: the verdict should be none."]
     if found.verdict == "unknown":
         told.append("--explain says what was tried.")
     return [*out, *told]
@@ -106,7 +108,7 @@ def _verdict(found: Diagnosis, width: int, _detail: _Detail) -> list[str]:
 
 def _causes(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
     causes = in_order(found.causes)
-    rows = [("cause", "parameter", "value", "95 % interval", "probability")]
+    rows: list[tuple[str, ...]] = [("cause", "parameter", "value", "95 % interval", "probability")]
     for cause in causes[: detail.causes]:
         rows += _cause(cause, detail.parameters)
     out = _columns(rows, width) if causes else []
@@ -132,7 +134,7 @@ def _cause(cause: Cause, most: int) -> list[tuple[str, ...]]:
 def _gaps(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
     gap, rows = found.gap, found.axis_rows()
     head = f"gap, % of the {torque_of(gap.compared)}"
-    table = [(head, "before", "re-fitted", "after", "floor", "verdict")]
+    table: list[tuple[str, ...]] = [(head, "before", "re-fitted", "after", "floor", "verdict")]
     shown = rows
     if len(rows) > detail.axes:
         largest = sorted(rows, key=lambda row: _excess(row[2]), reverse=True)[: detail.axes]
@@ -183,11 +185,12 @@ def _places(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
 
 def _findings(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
     findings = sorted(found.findings, key=_is_minor)
-    if not findings:
-        return []
-    if not detail.findings:
-        count = "1 finding" if len(findings) == 1 else f"{len(findings)} findings"
-        return [f"{count}: --verbose shows {'it' if len(findings) == 1 else 'them'}"]
+    count = "1 finding" if len(findings) == 1 else f"{len(findings)} findings"
+    left = [count] if findings and not detail.findings else []
+    if any(len(cause.parameters) > detail.parameters for cause in found.causes):
+        left.append("further parameters")
+    if not findings or not detail.findings:
+        return [f"not shown: {' and '.join(left)} (--verbose)"] if left else []
     whole = [f"finding: {finding}" for finding in findings[: detail.findings]]
     out = [_cut(line, width) for line in whole]
     more = len(findings) - len(out)
@@ -209,6 +212,17 @@ _SECTIONS: tuple[Callable[[Diagnosis, int, _Detail], list[str]], ...] = (
     _places,
     _findings,
 )
+
+
+def _next(found: Diagnosis, given: Collection[str], width: int, detail: _Detail) -> list[str]:
+    """Return the next steps, a line each where there is room."""
+    steps = next_steps(found, given)[: detail.steps]
+    if not detail.blanks:
+        return _folded(f"next: {' '.join(steps)}", width)
+    out = []
+    for i, step in enumerate(steps):
+        out += _folded(f"{'      ' if i else 'next: '}{step}", width, "      ")
+    return out
 
 
 def _share(x: float) -> str:
