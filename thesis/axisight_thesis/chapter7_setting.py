@@ -86,9 +86,11 @@ def broadband(
         down = LAST_LINE / PERIOD_S, FIRST_LINE / PERIOD_S
         start = 0.0
         if design.broadband == "centred chirp":
-            ends = (chirp(PERIOD_S, down, step, phase_rad=p).period for p in (0.0, np.pi / 2))
+            ends = (
+                chirp(PERIOD_S, step, band_hz=down, phase_rad=p).period for p in (0.0, np.pi / 2)
+            )
             start = -float(np.arctan2(*(x.sum() for x in ends)))
-        return chirp(PERIOD_S, down, step, phase_rad=start)
+        return chirp(PERIOD_S, step, band_hz=down, phase_rad=start)
     full = multisine(PERIOD_S, step, lines=design.lines(), seed=seed, run=realization)
     if design.broadband != "low":
         return clipped(full).scaled(peak=1.0)

@@ -187,22 +187,24 @@ def _signal(
         made, search = _multisine(s, sample_time_s)
         return made.scaled(peak=s.peak_rad_s), search
     if s.kind == "prbs":
-        return prbs(s.bits, sample_time_s, amplitude=s.peak_rad_s, hold=s.hold), None
+        return prbs(sample_time_s, bits=s.bits, amplitude=s.peak_rad_s, hold=s.hold), None
     period = _given("period_s", s.period_s)
     if s.kind == "triangle":
         return triangle(period, sample_time_s, amplitude=s.peak_rad_s), None
     band = _given("band_hz", s.band_hz)
     if s.kind == "chirp":
-        return chirp(period, band, sample_time_s, amplitude=s.peak_rad_s), None
+        return chirp(period, sample_time_s, band_hz=band, amplitude=s.peak_rad_s), None
     lines = multisine(period, sample_time_s, band_hz=band, grid=s.grid, seed=s.seed).lines
     if s.kind == "stepped_sine":
         frequencies = lines / period
-        return stepped_sine(period, sample_time_s, frequencies, amplitude=s.peak_rad_s).signal, None
+        return stepped_sine(
+            period, sample_time_s, frequency_hz=frequencies, amplitude=s.peak_rad_s
+        ).signal, None
     return (
         discrete_interval_binary(
             period,
             sample_time_s,
-            lines,
+            lines=lines,
             amplitude=s.peak_rad_s,
             hold=s.hold,
             starts=s.starts,

@@ -15,9 +15,9 @@ Grid = Literal["full", "odd", "odd_odd", "odd_random"]
 
 def line_set(
     period_s: float,
-    band_hz: tuple[float, float],
     sample_time_s: float,
     *,
+    band_hz: tuple[float, float],
     grid: Grid = "full",
     group: int = 4,
     seed: int = 0,
@@ -25,14 +25,21 @@ def line_set(
 ) -> tuple[Lines, Lines]:
     """Return the excited lines and the detection lines of a band, as multiples of 1/period.
 
-    ``sample_time_s`` [s] divides the period and sets the Nyquist frequency.
-    ``grid`` is ``"full"``; ``"odd"`` harmonics, which keep even distortion off the excited
-    lines; ``"odd_odd"``, k = 1, 5, 9, ..., which leaves odd lines free as well; or
-    ``"odd_random"``: of every ``group`` successive odd lines one is left out at random, as a
-    function of (seed, run). Lines of the band that are not excited are detection lines: even
-    ones show even distortion, odd ones odd distortion (Pintelon and Schoukens 2012,
-    section 4.3). Edges belong to the band. Raises InputError for a period that is no whole
-    number of samples and a band that is empty or reaches the Nyquist frequency.
+    Parameters
+    ----------
+    period_s : period [s], a whole number of samples.
+    sample_time_s : sample time [s]; it sets the Nyquist frequency.
+    band_hz : lowest and highest frequency [Hz]; both belong to the band.
+    grid : ``"full"`` excites every line. ``"odd"`` keeps even distortion off the excited lines.
+        ``"odd_odd"``, k = 1, 5, 9, ..., leaves odd lines free as well. ``"odd_random"`` leaves out
+        one of every ``group`` successive odd lines at random.
+    group, seed, run : for ``"odd_random"``; the choice is a function of (seed, run).
+
+    Lines of the band that are not excited are detection lines. Even ones show even distortion,
+    odd ones odd distortion (Pintelon and Schoukens 2012, section 4.3). Raises InputError for a
+    period that is no whole number of samples, and for a band that is empty or reaches the Nyquist
+    frequency.
+
     """
     n = whole_samples("period_s", period_s, sample_time_s)
     low, high = band_of("band_hz", band_hz)

@@ -217,7 +217,13 @@ def multisine(
     detection = _none()
     if band_hz is not None:
         chosen, detection = line_set(
-            period_s, band_hz, sample_time_s, grid=grid, group=group, seed=seed, run=run
+            period_s,
+            sample_time_s,
+            band_hz=band_hz,
+            grid=grid,
+            group=group,
+            seed=seed,
+            run=run,
         )
     else:
         chosen = lines_below("lines", lines, n)

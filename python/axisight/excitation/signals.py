@@ -108,19 +108,26 @@ class PeriodicSignal:
 
 def chirp(
     period_s: float,
-    band_hz: tuple[float, float],
     sample_time_s: float,
     *,
+    band_hz: tuple[float, float],
     amplitude: float = 1.0,
     phase_rad: float = 0.0,
 ) -> PeriodicSignal:
     """Return ``A sin(2 pi f1 t + pi (f2 - f1) t^2 / T0 + phi)``, Wernholt (2004), (5.4).
 
-    T0 is ``period_s`` [s], a whole number of samples of ``sample_time_s`` [s]; A is
-    ``amplitude``. ``band_hz`` is (f1, f2), both multiples of 1/T0; f1 > f2 sweeps down. The
-    repeated signal has no jump where f2 - f1 is an even multiple of 1/T0, or ``phase_rad`` a
-    multiple of pi; elsewhere it jumps by up to 2 A at the end of the period. A small mean remains that depends on
-    ``phase_rad``. The lines are those of the band. Raises InputError naming the field.
+    Parameters
+    ----------
+    period_s : period T0 [s], a whole number of samples.
+    sample_time_s : sample time [s].
+    band_hz : (f1, f2) [Hz], both multiples of 1/T0; f1 > f2 sweeps down. The lines are those of the band.
+    amplitude : A, in the unit of the signal.
+    phase_rad : phi [rad].
+
+    The repeated signal has no jump where f2 - f1 is an even multiple of 1/T0, or ``phase_rad`` a
+    multiple of pi. Elsewhere it jumps by up to 2 A at the end of the period. A small mean remains,
+    which depends on ``phase_rad``. Raises InputError naming the field.
+
     """
     n = whole_samples("period_s", period_s, sample_time_s)
     band_hz = band_of("band_hz", band_hz)
@@ -206,13 +213,14 @@ def square(
 
 
 def prbs(
-    bits: int, sample_time_s: float, *, amplitude: float = 1.0, hold: int = 1
+    sample_time_s: float, *, bits: int, amplitude: float = 1.0, hold: int = 1
 ) -> PeriodicSignal:
     """Return a maximum-length binary sequence of ``2^bits - 1`` values plus or minus A.
 
-    A is ``amplitude``. Each value is held for ``hold`` samples of ``sample_time_s`` [s]. Its
-    mean is ``A / (2^bits - 1)`` in size, its
-    autocorrelation at any other shift ``-A^2 / (2^bits - 1)``. ``bits`` 2 to 24.
+    A is ``amplitude``, ``bits`` is 2 to 24. Each value is held for ``hold`` samples of
+    ``sample_time_s`` [s]. The period follows: it has ``(2^bits - 1) hold`` samples. The mean is
+    ``A / (2^bits - 1)`` in size, the autocorrelation at any other shift ``-A^2 / (2^bits - 1)``.
+    Raises InputError naming the field.
     """
     bits, hold = whole("bits", bits, 2, 24), whole("hold", hold)
     amplitude = size_of("amplitude", amplitude)
@@ -226,8 +234,8 @@ def prbs(
 def discrete_interval_binary(
     period_s: float,
     sample_time_s: float,
-    lines: ArrayLike,
     *,
+    lines: ArrayLike,
     weight: ArrayLike = 1.0,
     amplitude: float = 1.0,
     hold: int = 1,
@@ -236,12 +244,21 @@ def discrete_interval_binary(
 ) -> PeriodicSignal:
     """Return a binary signal with most of its power on chosen lines.
 
-    The signs of a multisine with amplitudes ``weight`` are taken, then the phases of those,
-    until the signs repeat themselves (Van den Bos and Krol 1979); of ``starts`` random
-    starts the one whose weighted sum of amplitudes on the lines is largest is kept. Signs
-    change every ``hold`` samples of ``sample_time_s`` [s] only; ``period_s`` [s] is a whole
-    number of holds. Start i is a function of (``seed``, i). ``settings["power_share"]`` is
-    the share of the power on the lines. Raises InputError naming the field.
+    Parameters
+    ----------
+    period_s : period [s], a whole number of holds.
+    sample_time_s : sample time [s].
+    lines : lines k that carry the power, multiples of 1/``period_s``.
+    weight : amplitude wanted on each line, one number or (n_lines,).
+    amplitude : size of the two values.
+    hold : samples between possible changes of sign.
+    starts, seed : number of random starts; start i is a function of (``seed``, i).
+
+    The method alternates between the signs of a multisine with amplitudes ``weight`` and the phases
+    of these signs, until the signs repeat (Van den Bos and Krol 1979). It keeps the start with the
+    largest weighted sum of amplitudes on the lines. ``settings["power_share"]`` is the share of the
+    power on the lines. Raises InputError naming the field.
+
     """
     n = whole_samples("period_s", period_s, sample_time_s)
     hold = whole("hold", hold)
@@ -317,16 +334,16 @@ class SteppedSine:
 def stepped_sine(
     period_s: float,
     sample_time_s: float,
-    frequency_hz: ArrayLike,
     *,
+    frequency_hz: ArrayLike,
     amplitude: ArrayLike = 1.0,
     waiting_periods: int = 1,
     periods: int = 1,
 ) -> SteppedSine:
     """Return single sines at ``frequency_hz``, multiples of 1/``period_s``, one after the other.
 
-    They are sampled at ``sample_time_s`` [s]. Each lasts ``waiting_periods`` for the
-    transient and ``periods`` to be used, all of ``period_s``; ``amplitude`` is one number
+    The sample time is ``sample_time_s`` [s]. Each sine lasts ``waiting_periods`` for the
+    transient and ``periods`` to be used, all of ``period_s`` [s]. ``amplitude`` is one number
     or one per frequency. Every step starts at phase zero, so there is no jump. Raises
     InputError naming the field.
     """

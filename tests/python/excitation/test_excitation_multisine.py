@@ -38,22 +38,22 @@ def test_period_is_the_sum_of_sines(n_samples: int) -> None:
 
 
 def test_lines_of_a_band() -> None:
-    full, none = line_set(10.0, (1.0, 40.0), T)
+    full, none = line_set(10.0, T, band_hz=(1.0, 40.0))
     assert len(full) == 391 and full[0] == 10 and full[-1] == 400 and none.size == 0
-    odd, even = line_set(10.0, (1.0, 40.0), T, grid="odd")
+    odd, even = line_set(10.0, T, band_hz=(1.0, 40.0), grid="odd")
     assert np.all(odd % 2 == 1) and np.all(even % 2 == 0)
-    special, rest = line_set(10.0, (1.0, 40.0), T, grid="odd_odd")
+    special, rest = line_set(10.0, T, band_hz=(1.0, 40.0), grid="odd_odd")
     assert np.all(special % 4 == 1) and len(special) + len(rest) == 391
 
 
 def test_odd_random_leaves_one_line_of_every_group() -> None:
-    kept, free = line_set(10.0, (1.0, 40.0), T, grid="odd_random", group=5, seed=3)
-    odd, _ = line_set(10.0, (1.0, 40.0), T, grid="odd")
+    kept, free = line_set(10.0, T, band_hz=(1.0, 40.0), grid="odd_random", group=5, seed=3)
+    odd, _ = line_set(10.0, T, band_hz=(1.0, 40.0), grid="odd")
     groups = odd[: len(odd) // 5 * 5].reshape(-1, 5)
     assert np.all(np.isin(groups, kept).sum(axis=1) == 4)
     np.testing.assert_array_equal(np.sort(np.concatenate([kept, free])), np.arange(10, 401))
-    again, _ = line_set(10.0, (1.0, 40.0), T, grid="odd_random", group=5, seed=3)
-    other, _ = line_set(10.0, (1.0, 40.0), T, grid="odd_random", group=5, seed=3, run=1)
+    again, _ = line_set(10.0, T, band_hz=(1.0, 40.0), grid="odd_random", group=5, seed=3)
+    other, _ = line_set(10.0, T, band_hz=(1.0, 40.0), grid="odd_random", group=5, seed=3, run=1)
     np.testing.assert_array_equal(kept, again)
     assert not np.array_equal(kept, other)
 

@@ -34,7 +34,8 @@ def test_lines_are_told_apart() -> None:
 
 
 @pytest.mark.parametrize(
-    "signal", [ex.prbs(6, STEP), ex.chirp(0.5, (2.0, 40.0), STEP), ex.triangle(0.5, STEP)]
+    "signal",
+    [ex.prbs(STEP, bits=6), ex.chirp(0.5, STEP, band_hz=(2.0, 40.0)), ex.triangle(0.5, STEP)],
 )
 def test_every_kind_is_drawn(signal: ex.PeriodicSignal) -> None:
     assert f"{signal.crest_factor:.3f}" in plot_signal(signal).axes[1].get_title()

@@ -25,7 +25,7 @@ T = 5e-4
 
 @pytest.mark.parametrize("band", [(1.0, 40.0), (40.0, 1.0)])
 def test_chirp_is_scipys(band: tuple[float, float]) -> None:
-    signal = chirp(5.0, band, T, amplitude=12.0, phase_rad=0.4)
+    signal = chirp(5.0, T, band_hz=band, amplitude=12.0, phase_rad=0.4)
     t = np.arange(10_000) * T
     # SciPy's is a cosine; a sine lags it by 90 degrees.
     expected = 12 * scipy_chirp(t, f0=band[0], t1=5.0, f1=band[1], phi=np.degrees(0.4) - 90)
@@ -36,7 +36,7 @@ def test_chirp_is_scipys(band: tuple[float, float]) -> None:
 
 
 def test_chirp_closes_without_a_jump() -> None:
-    signal = chirp(5.0, (1.0, 40.0), T)
+    signal = chirp(5.0, T, band_hz=(1.0, 40.0))
     # The next sample after the last is the first: a step of at most 2 pi 40 T, as inside.
     assert abs(signal.period[0] - signal.period[-1]) <= 2 * np.pi * 40 * T
 
@@ -60,19 +60,21 @@ def test_square_is_the_filtered_one() -> None:
 
 @pytest.mark.parametrize("bits", [5, 10])
 def test_prbs_has_the_autocorrelation_of_maximum_length(bits: int) -> None:
-    signal = prbs(bits, T, amplitude=3.0)
+    signal = prbs(T, bits=bits, amplitude=3.0)
     n = 2**bits - 1
     assert signal.n_samples == n
     correlation = np.fft.irfft(np.abs(np.fft.rfft(signal.period)) ** 2, n) / n
     np.testing.assert_allclose(correlation[0], 9.0)
     np.testing.assert_allclose(correlation[1:], -9.0 / n, atol=1e-9)
     assert signal.crest_factor == pytest.approx(1.0)
-    np.testing.assert_array_equal(prbs(bits, T, amplitude=3.0, hold=4).period[::4], signal.period)
+    np.testing.assert_array_equal(
+        prbs(T, bits=bits, amplitude=3.0, hold=4).period[::4], signal.period
+    )
 
 
 def test_discrete_interval_binary_puts_its_power_on_the_lines() -> None:
     lines = [1, 2, 4, 8, 16, 32]
-    signal = discrete_interval_binary(0.256, T, lines, starts=20, seed=1)
+    signal = discrete_interval_binary(0.256, T, lines=lines, starts=20, seed=1)
     assert set(np.unique(signal.period)) == {-1.0, 1.0}
     share = signal.settings["power_share"]
     spectrum = np.abs(np.fft.rfft(signal.period)) / signal.n_samples
@@ -84,12 +86,14 @@ def test_discrete_interval_binary_puts_its_power_on_the_lines() -> None:
     settled = np.zeros(257, complex)
     settled[lines] = found / np.abs(found)
     np.testing.assert_array_equal(np.sign(np.fft.irfft(settled, 512)), signal.period)
-    held = discrete_interval_binary(0.256, T, lines, hold=2, starts=5)
+    held = discrete_interval_binary(0.256, T, lines=lines, hold=2, starts=5)
     np.testing.assert_array_equal(held.period[::2], held.period[1::2])
 
 
 def test_stepped_sine() -> None:
-    steps = stepped_sine(0.1, T, [10.0, 30.0], amplitude=[1.0, 2.0], waiting_periods=2, periods=3)
+    steps = stepped_sine(
+        0.1, T, frequency_hz=[10.0, 30.0], amplitude=[1.0, 2.0], waiting_periods=2, periods=3
+    )
     assert steps.signal.n_samples == 2 * 5 * 200
     # Two periods of 200 samples are waited for in each step of five.
     np.testing.assert_array_equal(steps.first_sample, [400, 1400])
@@ -143,17 +147,17 @@ def test_dc_level_moves_the_motor_a_quarter_turn_per_period() -> None:
 @pytest.mark.parametrize(
     ("action", "message"),
     [
-        (lambda: chirp(5.0, (1.05, 40.0), T), "band_hz: expected two different multiples"),
-        (lambda: chirp(5.0, (1.0, 1000.0), T), "Nyquist"),
+        (lambda: chirp(5.0, T, band_hz=(1.05, 40.0)), "band_hz: expected two different multiples"),
+        (lambda: chirp(5.0, T, band_hz=(1.0, 1000.0)), "Nyquist"),
         (lambda: triangle(0.0105, T), "multiple of four"),
         (lambda: square(0.0105, T), "even"),
         (lambda: square(1.0, T, smoothing_samples=600), "smoothing"),
-        (lambda: prbs(1, T), "bits: expected a whole number 2 to 24"),
-        (lambda: discrete_interval_binary(0.1, T, []), "lines: expected at least one"),
-        (lambda: discrete_interval_binary(0.1, T, [1], hold=3), "hold: expected a divisor"),
-        (lambda: discrete_interval_binary(0.1, T, [1], weight=-1.0), "weight"),
-        (lambda: stepped_sine(0.1, T, [11.0]), "frequency_hz: expected multiples"),
-        (lambda: stepped_sine(0.1, T, [0.0]), "above 0"),
+        (lambda: prbs(T, bits=1), "bits: expected a whole number 2 to 24"),
+        (lambda: discrete_interval_binary(0.1, T, lines=[]), "lines: expected at least one"),
+        (lambda: discrete_interval_binary(0.1, T, lines=[1], hold=3), "hold: expected a divisor"),
+        (lambda: discrete_interval_binary(0.1, T, lines=[1], weight=-1.0), "weight"),
+        (lambda: stepped_sine(0.1, T, frequency_hz=[11.0]), "frequency_hz: expected multiples"),
+        (lambda: stepped_sine(0.1, T, frequency_hz=[0.0]), "above 0"),
         (lambda: direction_matrix("t2", 4), "three axes"),
         (lambda: direction_matrix("hadamard", 3), "power of two"),
         (lambda: direction_matrix("t9", 3), "directions: expected one of"),
@@ -162,7 +166,7 @@ def test_dc_level_moves_the_motor_a_quarter_turn_per_period() -> None:
         (lambda: references(triangle(1.0, T), 2, directions="dft"), "multisine without snow"),
         (lambda: references(triangle(1.0, T), 2, square=square(0.3, T)), "square: expected"),
         (lambda: references(triangle(1.0, T), 2, dc_level=[1, 2, 3]), "dc_level"),
-        (lambda: line_set(1.0, (1.0, 2.0), T, grid="odd_random", group=1), "group"),
+        (lambda: line_set(1.0, T, band_hz=(1.0, 2.0), grid="odd_random", group=1), "group"),
     ],
 )
 def test_misuse(action: object, message: str) -> None:
