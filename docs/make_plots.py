@@ -66,12 +66,18 @@ SHOWN = {
         "Measured torque, and the torque of the simulator before and after, on a validation log.",
     ),
     "axisight.plot_response_matrix": ("response", "A measured frequency response, all elements."),
-    "axisight.plot_bode": ("responses, output=1, input=2", "One element of a frequency response, with 95 % bands."),
+    "axisight.plot_bode": (
+        "responses, output=1, input=2",
+        "One element of a frequency response, with 95 % bands.",
+    ),
     "axisight.excitation.plots.plot_signal": (
         "signal",
         "A period of a multisine, its lines, and the histogram of its samples.",
     ),
-    "axisight.excitation.plots.plot_references": ("made", "References of all experiments of a design."),
+    "axisight.excitation.plots.plot_references": (
+        "made",
+        "References of all experiments of a design.",
+    ),
     "axisight.blind.plots.plot_confusion": (
         "score",
         "Confusion matrix of a benchmark: true causes against causes named first ([how often it is right](truth.md)).",

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
@@ -23,6 +22,9 @@ _MOST_THREADS = 1024
 # Bytes of a name, and of a whole path, that file systems take.
 _LONGEST_NAME = 255
 _LONGEST_PATH = 4000
+# Longer texts are no typing errors of a name.
+_LONGEST_WORD = 100
+_ALIKE = 0.7
 
 
 def short(text: str, most: int = 80) -> str:
@@ -41,6 +43,31 @@ def shown(value: object) -> str:
     except (ValueError, RecursionError):  # a number of thousands of digits, or nested without end
         text = f"a {type(value).__name__} too large to be shown"
     return short(text)
+
+
+def nearest(value: object, known: Iterable[str]) -> str | None:
+    """Return the known word that a text was meant to be; None where no word is near.
+
+    Case, spaces and dashes do not count. The start of exactly one known word stands for that word.
+    """
+    if not isinstance(value, str) or not 0 < len(value) <= _LONGEST_WORD:
+        return None
+    words = {_plain(word): word for word in known if word.isprintable()}
+    wanted = _plain(value)
+    if near := get_close_matches(wanted, words, n=1, cutoff=_ALIKE):
+        return words[near[0]]
+    begun = [word for plain, word in words.items() if len(wanted) > 2 and plain.startswith(wanted)]
+    return begun[0] if len(begun) == 1 else None
+
+
+def _plain(word: str) -> str:
+    return word.strip().lower().replace(" ", "_").replace("-", "_")
+
+
+def did_you_mean(value: object, known: Iterable[str]) -> str:
+    """Return ``. Did you mean 'word'?`` for the end of a message; nothing where no known word is near."""
+    near = nearest(value, known)
+    return "" if near is None else f". Did you mean {near!r}?"
 
 
 def _array(value: object, kinds: str) -> NDArray[Any] | None:
@@ -136,43 +163,9 @@ def one_of(field: str, value: object, known: Iterable[str]) -> str:
     """Return one of the known words."""
     names = list(known)
     if not isinstance(value, str) or value not in names:
-        raise InputError(f"{field}: expected one of {', '.join(names)}, got {shown(value)}")
+        meant = did_you_mean(value, names)
+        raise InputError(f"{field}: expected one of {', '.join(names)}, got {shown(value)}{meant}")
     return value
-
-
-def axis_number(value: object, joints: Sequence[str], field: str = "axis") -> int:
-    """Return the number of an axis (from 1) for a number or the name of a joint.
-
-    ``joints``: names of the robot's joints in the order of its axes. Digits as text count as a
-    number where no joint has that name. Raises InputError naming ``field``, the joints and the
-    nearest of them.
-    """
-    if isinstance(value, str):
-        if list(joints).count(value) == 1:
-            return list(joints).index(value) + 1
-        if value.isdecimal() and 1 <= int(value) <= len(joints):
-            return int(value)
-    else:
-        array = _array(value, "iu")
-        if array is not None and not array.ndim and 1 <= int(array) <= len(joints):
-            return int(array)
-    expected = "1" if len(joints) == 1 else f"1 to {len(joints)}"
-    raise InputError(
-        f"{field}: expected {expected} or a joint name ({', '.join(joints)}), "
-        f"got {shown(value)}{_nearest_axis(value, joints)}"
-    )
-
-
-def _nearest_axis(value: object, joints: Sequence[str]) -> str:
-    """Return a question with the axis that was meant, empty where none is near."""
-    if not isinstance(value, str):
-        return ""
-    numbered = re.fullmatch(r"(?:axis|joint|j|a)[ _-]?0*(\d{1,4})", value, re.IGNORECASE)
-    if numbered and 1 <= int(numbered[1]) <= len(joints):
-        return f". Did you mean {int(numbered[1])}?"
-    lower = {name.lower(): name for name in joints if name.isprintable()}
-    near = get_close_matches(value[:_LONGEST_NAME].lower(), lower, n=1, cutoff=0.6)
-    return f". Did you mean {lower[near[0]]!r}?" if near else ""
 
 
 def words(field: str, value: object) -> str:

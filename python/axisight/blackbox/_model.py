@@ -13,11 +13,13 @@ from scipy import signal
 
 from axisight.blackbox._data import Complex, Real, lines
 from axisight.blackbox._propagation import states
+from axisight.display.summary import summarized
 from axisight.errors import InputError, MissingExtraError
 from axisight.frf.response import frequency_response
 from axisight.records.experiment import Experiment
 
 
+@summarized
 @dataclass(frozen=True)
 class StateSpaceModel:
     """A model in innovations form, Wernholt (2004), (3.26).

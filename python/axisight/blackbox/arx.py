@@ -31,6 +31,7 @@ from axisight.blackbox._data import (
     slowest_first,
 )
 from axisight.blackbox._model import StateSpaceModel, expect_experiment
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.frf.response import frequency_response
 from axisight.records.experiment import Experiment
@@ -66,6 +67,7 @@ class Triangle:
         return wanted
 
 
+@summarized
 @dataclass(frozen=True)
 class ARXModel:
     """An ARX model with its uncertainty.

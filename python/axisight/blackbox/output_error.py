@@ -34,6 +34,7 @@ from axisight.blackbox._data import (
     whole,
 )
 from axisight.blackbox._model import StateSpaceModel
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.frf.response import frequency_response
 from axisight.records.experiment import Experiment
@@ -53,6 +54,7 @@ PULSE_SAMPLES = 4000
 """Length of the pulse responses that a start with several inputs is taken from."""
 
 
+@summarized
 @dataclass(frozen=True)
 class OutputErrorModel:
     """An output-error model with its uncertainty.

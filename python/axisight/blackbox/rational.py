@@ -21,6 +21,7 @@ from axisight.blackbox import _vector_fitting
 from axisight.blackbox._data import Complex, Real, lines, whole
 from axisight.blackbox._sections import Domain, Sections, Solved, Weighted
 from axisight.blackbox._weights import UsableLines, Weighting, usable_lines
+from axisight.display.summary import summarized
 from axisight.errors import AxisightError, InputError
 from axisight.frf.pooled import MISFIT_EXPLAINED, few_words
 from axisight.frf.response import DIMS, frequency_response
@@ -28,6 +29,7 @@ from axisight.statistics.evaluation import last_value
 from axisight.statistics.least_squares import inverse_root
 
 
+@summarized
 @dataclass(frozen=True)
 class RationalModel:
     """A rational model with its uncertainty.

@@ -21,6 +21,7 @@ from axisight.blackbox._data import Complex, Real, lines, whole
 from axisight.blackbox._model import control_module, evaluate
 from axisight.blackbox._sections import Weighted
 from axisight.blackbox.rational import RationalModel
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.frf.response import frequency_response
 from axisight.statistics.least_squares import scaled_solution
@@ -29,6 +30,7 @@ ROUNDS = 50
 """Of fitting inputs and outputs in turn."""
 
 
+@summarized
 @dataclass(frozen=True)
 class Realization:
     """x' = A x + B u, or x(t+T) = A x + B u with ``sample_time_s``; y = C x + D u.

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from axisight.blackbox._data import Real, whole
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.statistics.correlation import (
     covariance_spread,
@@ -22,6 +23,7 @@ LEAST_SPREAD = 1e-6
 """Share of the largest variance of cross-covariances below which a direction carries no test."""
 
 
+@summarized
 @dataclass(frozen=True)
 class ResidualTests:
     """Results over outputs and inputs.

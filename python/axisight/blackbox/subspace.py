@@ -28,6 +28,7 @@ from scipy import linalg
 from axisight.blackbox._data import Complex, Real, fit_percent, gathered, whole
 from axisight.blackbox._model import StateSpaceModel
 from axisight.blackbox._propagation import states
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.records.experiment import Experiment
 
@@ -43,6 +44,7 @@ ROUNDING = 1e-9
 Method = Literal["pbsid", "moesp"]
 
 
+@summarized
 @dataclass(frozen=True)
 class SubspaceModel:
     """A state-space model and the singular values its order was read from.

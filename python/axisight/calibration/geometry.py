@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.robot import Robot
 
@@ -22,6 +23,7 @@ GROUPS = ("compliance", "offset", "tilt", "origin", "tool", "base")
 """Kinds of parameters, those first that a combination is named after."""
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Geometry:
     """Geometry and joint compliance of a chain, in the frames of ``axisight.robot/1``.

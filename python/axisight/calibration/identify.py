@@ -21,6 +21,7 @@ from axisight.calibration.geometry import (
 )
 from axisight.calibration.measurements import Checked, Loads, Measurement, check
 from axisight.display import html
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.robot import Robot
 from axisight.statistics.evaluation import last_value
@@ -53,6 +54,7 @@ _ADVICE: dict[str, str] = {
 }
 
 
+@summarized
 @dataclass(frozen=True)
 class Combination:
     """What the measurements determine: a parameter with those that cannot be told from it.
@@ -69,6 +71,7 @@ class Combination:
     weights: dict[str, float] = field(repr=False)
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """A calibrated geometry and how well it is known.

@@ -16,10 +16,12 @@ from axisight.calibration.geometry import (
     real,
     refuse_no_rotation,
 )
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.robot import Robot
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Positions:
     """Absolute positions of the target, as a laser tracker gives them.
@@ -35,6 +37,7 @@ class Positions:
     payload_kg: ArrayLike = 0.0
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Poses:
     """Absolute poses of the target: ``position_m`` (n, 3) and ``rotation`` (n, 3, 3).
@@ -51,6 +54,7 @@ class Poses:
     payload_kg: ArrayLike = 0.0
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Distances:
     """Distances between two positions of the target, as a ball bar or a scale gives them.
@@ -65,6 +69,7 @@ class Distances:
     payload_kg: ArrayLike = 0.0
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class SamePoint:
     """Configurations in which the target was at the same point, wherever that is.
@@ -83,6 +88,7 @@ class SamePoint:
 Measurement: TypeAlias = Positions | Poses | Distances | SamePoint
 
 
+@summarized
 @dataclass(frozen=True)
 class Loads:
     """What the joints hold while they are measured.

@@ -10,7 +10,6 @@ import typer
 from numpy.typing import NDArray
 
 import axisight
-from axisight.arguments import axis_number
 from axisight.cli.common import Columns, Force, errors, say
 from axisight.cli.identify_common import (
     Out,
@@ -24,6 +23,7 @@ from axisight.cli.identify_common import (
     write_robot,
 )
 from axisight.cli.panels import EXCITATION, MODEL
+from axisight.cli.robot import axis_of
 from axisight.errors import InputError
 from axisight.robot import Robot
 
@@ -205,7 +205,7 @@ def axis_command(
 def _number(axis: str, machine: Robot | None) -> int:
     """Return the number of an axis, by its joint too where there is a robot."""
     if machine is not None:
-        return axis_number(axis, machine.axis_names, "--axis")
+        return axis_of(axis, machine, "--axis")
     if not axis.isdecimal() or int(axis) < 1:
         raise InputError(
             f"--axis: expected a number from 1, or a joint name and the robot in --robot, got {axis!r}"

@@ -10,14 +10,14 @@ from typing import Annotated
 
 import typer
 
-from axisight.arguments import axis_number
+from axisight.arguments import nearest
 from axisight.cli.common import numbers, say
 from axisight.cli.model_options import AS_IT_IS, ModelOptions
 from axisight.cli.panels import SIMULATOR
-from axisight.cli.suggest import nearest
 from axisight.effects import Effect, effect_info, effect_table
 from axisight.errors import InputError
 from axisight.robot import Robot
+from axisight.robot.axis_names import axis_number
 from axisight.robot_file import refuse_effects_beside
 from axisight.robot_import import is_model_file
 
@@ -105,12 +105,18 @@ class GivenEffect:
     def on(self, robot: Robot) -> Effect:
         """Return the effect of a robot; raises InputError quoting option and text."""
         try:
-            numbered = [axis_number(axis, robot.axis_names) for axis in self.axes]
+            numbered = [axis_of(axis, robot) for axis in self.axes]
             if len(numbered) == 2:
                 return Effect(self.name, None, self.parameters, (numbered[0], numbered[1]))
             return Effect(self.name, numbered[0] if numbered else None, self.parameters)
         except InputError as error:
             raise InputError(f"{self.option} {self.text!r}: {error}") from None
+
+
+def axis_of(text: str, robot: Robot, field: str = "axis") -> int:
+    """Return the number (from 1) of an axis that was given as text: a number, or the name of its joint."""
+    number = text.isdecimal() and text not in robot.axis_names
+    return axis_number(int(text) if number else text, robot.axis_names, field)
 
 
 def effects_on(robot: Robot, given: Iterable[GivenEffect]) -> list[Effect]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
+
+from axisight.arguments import nearest
 
 # As errors say it: names in quotes, those that there are with commas between.
 _QUOTED = r"['\"`](?P<got>[^'\"`]+)['\"`]"
@@ -58,9 +58,3 @@ def _file_beside(path: Path) -> str | None:
         return None
     near = nearest(path.name, [name for name in names if not name.startswith(".")])
     return None if near is None else str(path.with_name(near))
-
-
-def nearest(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name most like ``name``; none that would not show as it is."""
-    near = get_close_matches(name, [x for x in known if x.isprintable()], n=1, cutoff=0.7)
-    return near[0] if near else None

@@ -15,8 +15,8 @@ def page(title: str, *parts: str) -> str:
     return f"<div><p><strong>{_text(title)}</strong></p>{''.join(parts)}</div>"
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """Return a table of texts; of very many rows the first, and a row that says so."""
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
+    """Return a table of texts below its caption; of very many rows the first, and a row that says so."""
     rows = iter(rows)
     shown = [_row("td", row) for row in islice(rows, _MOST_ROWS)]
     more = sum(1 for _ in rows)
@@ -24,7 +24,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "")
         shown.append(_row("td", (f"and {more} more", *[""] * (len(head) - 1))))
     if not shown:
         return ""
-    above = f"<caption>{_text(caption)}</caption>" if caption else ""
+    above = f"<caption>{_text(caption)}</caption>"
     return f"<table>{above}<thead>{_row('th', head)}</thead><tbody>{''.join(shown)}</tbody></table>"
 
 
@@ -37,7 +37,7 @@ def values(
     """Return a table of parameters with standard errors, and units where they are known."""
     rows = zip(names, map(number, found), map(number, std), units or [""] * len(names), strict=True)
     head = ("parameter", "value", "standard error", *(["unit"] if units else []))
-    return table(head, (row[: len(head)] for row in rows))
+    return table(head, (row[: len(head)] for row in rows), "Parameters with standard errors")
 
 
 def lines(texts: Iterable[str]) -> str:
@@ -51,7 +51,8 @@ def number(value: float) -> str:
 
 
 def _row(cell: str, texts: Sequence[str]) -> str:
-    return "<tr>" + "".join(f"<{cell}>{_text(text)}</{cell}>" for text in texts) + "</tr>"
+    scope = ' scope="col"' if cell == "th" else ""
+    return "<tr>" + "".join(f"<{cell}{scope}>{_text(text)}</{cell}>" for text in texts) + "</tr>"
 
 
 def _text(text: str) -> str:

@@ -5,54 +5,96 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from axisight.arguments import did_you_mean, short, shown
 from axisight.effects.table import EffectInfo, effect_info
 from axisight.errors import InputError
 
 EffectTuple = tuple[str, int | tuple[int, int] | None, list[float]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class Effect:
     """An effect at work.
 
-    ``axis`` is the 1-based driven axis, ``axes`` the two of an effect between axes; both are None
-    for effects of the whole arm. ``parameters`` maps names to values; those left out take their
-    neutral value. Effects are equal if they have the same name, place and values. Raises
-    InputError for an unknown effect or parameter, and for a place that the effect cannot have.
+    Parameters
+    ----------
+    name : one of `effect_table`.
+    axis : the driven axis, from 1, or the name of its joint; None for effects of the whole arm.
+    parameters : values by name; those left out take their neutral value.
+    axes : the two axes of an effect between axes, as numbers or joint names.
+    joints : what `axis` or `axes` said where that was a joint name. `Robot.placed` puts numbers in its
+        place, and so does every call that has a robot. Not to be given.
+
+    Effects are equal if they have the same name, place and values. Raises InputError for an unknown
+    effect or parameter, and for a place that the effect cannot have.
+
     """
 
     name: str
-    axis: int | None = None
-    parameters: Mapping[str, float] | None = None
-    axes: tuple[int, int] | None = None
+    axis: int | None
+    parameters: Mapping[str, float] | None
+    axes: tuple[int, int] | None
+    joints: tuple[int | str, ...]
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        name: str,
+        axis: int | str | None = None,
+        parameters: Mapping[str, float] | None = None,
+        axes: Sequence[int | str] | None = None,
+        joints: Sequence[int | str] = (),
+    ) -> None:
         """Refuse unknown names and impossible axes early."""
-        info = effect_info(self.name)
-        if self.axis is not None and self.axis < 1:
-            raise InputError(f"effect {self.name!r}: axis: expected 1 or more, got {self.axis}")
-        if info.scope == "axes" and self.axis is not None:
+        info = effect_info(name)
+        if axis is not None and info.scope == "axes":
             raise InputError(
-                f"effect {self.name!r}: axis: expected axes, it acts between two, got {self.axis}"
+                f"effect {name!r}: axis: expected axes, it acts between two, got {shown(axis)}"
             )
-        if self.axes is not None:
-            object.__setattr__(self, "axes", _two_axes(info, self.axes))
-        known = [p.name for p in info.parameters]
-        for name in self.parameters or {}:
-            if name not in known:
-                expected = ", ".join(known)
-                raise InputError(f"effect {self.name!r}: parameter {name!r}: expected {expected}")
+        number, both = None, None
+        if isinstance(axis, str):
+            joints = (axis,)
+        elif axis is not None:
+            number, joints = _axis(name, axis), ()
+        if axes is not None:
+            both = _two_axes(info, axes)
+            named = any(isinstance(place, str) for place in both)
+            both, joints = (None, both) if named else (both, ())
+        _check_parameters(info, parameters)
+        values = (name, number, parameters, both, tuple(joints))
+        for field, value in zip(_FIELDS, values, strict=True):
+            object.__setattr__(self, field, value)
+
+    def __repr__(self) -> str:
+        """Return the call that makes it."""
+        place = self.joints[0] if len(self.joints) == 1 else self.axis
+        values = {name: float(f"{value:.6g}") for name, value in (self.parameters or {}).items()}
+        parts = [repr(self.name), *([] if place is None else [repr(place)])]
+        if values:
+            parts.append(repr(values) if place is not None else f"parameters={values}")
+        if self.axes is not None or len(self.joints) == 2:
+            parts.append(f"axes={self.axes or self.joints}")
+        return f"Effect({', '.join(parts)})"
 
     @property
     def label(self) -> str:
         """``effect@axis`` or ``effect@5,6``; the effect alone when it belongs to the whole arm."""
+        if self.joints:
+            return f"{self.name}@{','.join(map(str, self.joints))}"
         if self.axes is not None:
             return f"{self.name}@{self.axes[0]},{self.axes[1]}"
         return self.name if self.axis is None else f"{self.name}@{self.axis}"
 
     @property
     def place(self) -> int | tuple[int, int] | None:
-        """Axis, axes, or None for the whole arm."""
+        """Axis, axes, or None for the whole arm; raises InputError for joint names without their robot."""
+        if self.joints:
+            named = ", ".join(str(joint) for joint in self.joints)
+            raise InputError(
+                f"effect {self.name!r}: axis: expected a number from 1 here, got {short(named)!r}; "
+                "robot.placed([effect]) turns joint names into numbers"
+            )
         return self.axis if self.axes is None else self.axes
 
     @property
@@ -94,11 +136,48 @@ class Effect:
         return [given.get(p.name, p.neutral) for p in effect_info(self.name).parameters]
 
 
-def _two_axes(info: EffectInfo, axes: Sequence[int]) -> tuple[int, int]:
+_FIELDS = ("name", "axis", "parameters", "axes", "joints")
+
+
+def _axis(effect: str, axis: object, field: str = "axis") -> int:
+    """Return the number of an axis; raises InputError for another type and for less than 1."""
+    if isinstance(axis, bool) or not isinstance(axis, int | np.integer):
+        got = shown(axis)
+        raise InputError(
+            f"effect {effect!r}: {field}: expected a number or a joint name, got {got}"
+        )
+    if axis < 1:
+        raise InputError(f"effect {effect!r}: {field}: expected 1 or more, got {axis}")
+    return int(axis)
+
+
+def _two_axes(info: EffectInfo, axes: Sequence[int | str]) -> tuple[int | str, int | str]:
+    """Return two different axes, as numbers or joint names."""
     expected = "two different axes from 1" if info.scope == "axes" else "none"
-    if info.scope != "axes" or len(axes) != 2 or axes[0] == axes[1] or min(axes) < 1:
-        raise InputError(f"effect {info.name!r}: axes: expected {expected}, got {tuple(axes)}")
-    return axes[0], axes[1]
+    two = isinstance(axes, Sequence) and not isinstance(axes, str) and len(axes) == 2
+    if info.scope != "axes" or not two or axes[0] == axes[1]:
+        raise InputError(f"effect {info.name!r}: axes: expected {expected}, got {shown(axes)}")
+    if any(not isinstance(axis, str | int | np.integer) or axis == 0 for axis in axes):
+        raise InputError(f"effect {info.name!r}: axes: expected {expected}, got {shown(axes)}")
+    first, second = (a if isinstance(a, str) else _axis(info.name, a, "axes") for a in axes)
+    return first, second
+
+
+def _check_parameters(info: EffectInfo, parameters: object) -> None:
+    """Raise InputError for what is no mapping, and for a parameter that the effect does not have."""
+    if parameters is None:
+        return
+    known = [p.name for p in info.parameters]
+    if not isinstance(parameters, Mapping):
+        example = f"{{{known[0]!r}: ...}}" if known else "none"
+        got = shown(parameters)
+        raise InputError(f"effect {info.name!r}: parameters: expected {example}, got {got}")
+    for name in parameters:
+        if name not in known:
+            meant = did_you_mean(name, known)
+            raise InputError(
+                f"effect {info.name!r}: parameter {name!r}: expected {', '.join(known)}{meant}"
+            )
 
 
 def core_effects(effects: Iterable[Effect]) -> list[EffectTuple]:

@@ -11,6 +11,8 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from axisight import _core
+from axisight.arguments import did_you_mean, shown
+from axisight.display.summary import summarized
 from axisight.effects.priors import half_normal, log_normal
 from axisight.effects.relations import BegunFrom, Formula, Later, Plainer, Resembles, SpringChange
 from axisight.errors import InputError
@@ -23,6 +25,7 @@ time [s] that fixed steps follow no less than one of; its inverse is what shows;
 """
 
 
+@summarized
 @dataclass(frozen=True)
 class EffectParameter:
     """One parameter of an effect.
@@ -61,6 +64,7 @@ class EffectParameter:
         return half_normal(value, self.neutral, self.typical, bounds)
 
 
+@summarized
 @dataclass(frozen=True)
 class EffectInfo:
     """Description of an effect: equation and symbols as in the source it names.
@@ -203,9 +207,14 @@ def _parameter(row: _core.ParameterInfo) -> EffectParameter:
 
 
 def effect_info(name: str) -> EffectInfo:
-    """Return the description of the effect called ``name``; raises InputError if there is none."""
-    try:
-        return effect_table()[name]
-    except KeyError:
-        known = ", ".join(effect_table())
-        raise InputError(f"effect {name!r}: expected one of {known}") from None
+    """Return the description of the effect called ``name``.
+
+    Raises InputError for an unknown name. The message has the nearest known name.
+    """
+    table = effect_table()
+    if isinstance(name, str) and name in table:
+        return table[name]
+    meant = did_you_mean(name, table) or "."
+    raise InputError(
+        f"unknown effect {shown(name)}{meant} axisight.effect_table() lists all {len(table)} effects"
+    )

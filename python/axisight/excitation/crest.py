@@ -21,6 +21,7 @@ from axisight.arguments import (
     threads_of,
     whole,
 )
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.excitation.multisine import Multisine, response_at
 
@@ -57,6 +58,7 @@ class LpRefinement:
     oversampling: int = 16
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class CrestSearch:
     """What a search found.

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.arguments import instance, path_of, shown
+from axisight.display.summary import summarized
 from axisight.documents import parse_toml, read_text
 from axisight.errors import InputError
 from axisight.excitation.crest import CrestSearch, optimize_crest_factor
@@ -101,6 +102,7 @@ class ExcitationDesign(_Part):
     limits: LimitDesign | None = None
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Excited:
     """What a design gave: references, search of phases and check of limits if there were any."""

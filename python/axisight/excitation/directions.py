@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
-from axisight.arguments import Real, reals, whole
+from axisight.arguments import Real, did_you_mean, reals, shown, whole
 from axisight.errors import InputError
 
 Directions = Literal["t1", "identity", "t2", "hadamard"]
@@ -27,7 +27,10 @@ def direction_matrix(name: Directions | ArrayLike, n_inputs: int) -> Real:
     if isinstance(name, str):
         if name not in get_args(Directions):
             known = ", ".join(get_args(Directions))
-            raise InputError(f"directions: expected one of {known} or a matrix, got {name!r}")
+            meant = did_you_mean(name, get_args(Directions))
+            raise InputError(
+                f"directions: expected one of {known} or a matrix, got {shown(name)}{meant}"
+            )
         return _core.directions("identity" if name == "t1" else str(name), n)
     what = f"finite numbers of shape ({n}, n_experiments)"
     matrix = reals("directions", name, what, 2).copy()

@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from axisight.arguments import Real, instance, one_of, several, whole
+from axisight.display.summary import summarized
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.excitation.checks import numbers, per_item
@@ -29,6 +30,7 @@ UNITS: dict[Quantity, str] = {
 }
 
 
+@summarized
 @dataclass(frozen=True)
 class Limits:
     """Largest absolute values of every motor: one number for all axes, one per axis, or None.
@@ -41,6 +43,7 @@ class Limits:
     torque_nm: ArrayLike | None = None
 
 
+@summarized
 @dataclass(frozen=True)
 class Excess:
     """One limit that one axis passes in one experiment.
@@ -69,6 +72,7 @@ class Excess:
         )
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class LimitReport:
     """What a check found.

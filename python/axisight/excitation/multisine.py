@@ -20,6 +20,7 @@ from axisight.arguments import (
     seed_of,
     whole,
 )
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.excitation.checks import (
     LARGEST_SIZE,
@@ -41,6 +42,7 @@ def _nothing() -> Real:
     return np.empty(0)
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Multisine:
     """One period of ``x(t) = sum_k A_k sin(2 pi k t / T0 + phi_k)``, Wernholt (2004), (5.5).

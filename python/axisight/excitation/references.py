@@ -19,6 +19,7 @@ from axisight.arguments import (
     whole,
     words,
 )
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.excitation.checks import few_enough, per_item
 from axisight.excitation.directions import MOST_INPUTS, Directions, dft_matrix, direction_matrix
@@ -26,6 +27,7 @@ from axisight.excitation.multisine import Multisine, random_phases
 from axisight.excitation.signals import PeriodicSignal
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class References:
     """Velocity references (or other inputs) of a set of experiments.

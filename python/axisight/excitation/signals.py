@@ -23,6 +23,7 @@ from axisight.arguments import (
     whole,
     words,
 )
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.excitation.checks import (
     LARGEST_SIZE,
@@ -38,6 +39,7 @@ from axisight.excitation.checks import (
 _FINE = 32
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class PeriodicSignal:
     """One period of a sampled signal.
@@ -312,6 +314,7 @@ def _settled(weight: Real, lines: Lines, count: int, phase: Real) -> Real:
     return signs
 
 
+@summarized
 @dataclass(frozen=True)
 class SteppedSine:
     """Single sines one after the other, each a whole number of periods T0.

@@ -11,7 +11,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight import _core
+from axisight.arguments import did_you_mean
 from axisight.display import html
+from axisight.display.summary import summarized
 from axisight.effects import Effect, core_effects, effect_info
 from axisight.errors import InputError
 from axisight.fitting.divergence import Diverged
@@ -22,6 +24,7 @@ from axisight.simulation import Integrator
 Array = NDArray[np.float64]
 
 
+@summarized
 @dataclass(frozen=True)
 class Parameter:
     """One number to fit.
@@ -44,6 +47,7 @@ class Parameter:
     nuisance: bool = False
 
 
+@summarized
 @dataclass(frozen=True)
 class Weighting:
     """Weight of residuals over frequency, one table per axis, and decimation.
@@ -111,6 +115,7 @@ class FitOptions:
         return Integrator(self.method, self.tolerance, self.substeps)
 
 
+@summarized
 @dataclass(frozen=True)
 class Fitted:
     """Result of a fit.
@@ -193,7 +198,9 @@ def robot_parameter(
     """
     known = robot_parameters(robot)
     if name not in known:
-        raise InputError(f"parameter {name!r}: expected one of {', '.join(known)}")
+        raise InputError(
+            f"parameter {name!r}: expected one of {', '.join(known)}{did_you_mean(name, known)}"
+        )
     nominal = known[name]
     size = abs(nominal) if nominal else 1.0
     signed = name.rsplit(".", 1)[1].startswith("com_")
@@ -220,6 +227,7 @@ def effect_parameter(effects: Sequence[Effect], index: int, name: str) -> Parame
     if name not in info:
         raise InputError(
             f"effect {effects[index].name!r}: parameter {name!r}: expected {', '.join(info)}"
+            f"{did_you_mean(name, info)}"
         )
     p = info[name]
     initial = (effects[index].parameters or {}).get(name, p.neutral)
@@ -276,7 +284,7 @@ def fit(
     Raises InputError for misuse, and for a start that cannot be simulated; non-convergence is a status.
     """
     chosen = options or FitOptions()
-    added = list(effects)
+    added = robot.placed(effects)
     closed = is_closed_loop(robot, logs)
     ready = _core.SimulatedLogs(
         robot.core,

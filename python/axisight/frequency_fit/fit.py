@@ -99,7 +99,7 @@ def fit_responses(
     ) -> _core.FrequencyFitResult:
         return _core.fit_frequency_responses(
             robot.core,
-            core_effects(effects),
+            core_effects(robot.placed(effects)),
             list(start),
             [one.core(g, w) for one, g, w in zip(data, reference, weighing, strict=True)],
             core_options(chosen),

@@ -11,7 +11,8 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
-from axisight.arguments import positive
+from axisight.arguments import one_of, positive
+from axisight.display.summary import summarized
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.frf import Flag
@@ -31,6 +32,7 @@ UNITS: dict[str, Quantity] = {f"rad{rate}/Nm": quantity for quantity, rate in RA
 DIMS = ("frequency_hz", "output", "input")
 
 
+@summarized
 @dataclass(frozen=True)
 class MeasuredResponse:
     """A response from motor torques to motor motions at one operating point.
@@ -66,8 +68,7 @@ class MeasuredResponse:
 
     def __post_init__(self) -> None:
         """Check shapes and values."""
-        if self.quantity not in ORDER:
-            raise InputError(f"quantity: expected one of {', '.join(ORDER)}, got {self.quantity!r}")
+        one_of("quantity", self.quantity, ORDER)
         _store(self, "joint_angle_rad", tuple(_real("joint_angle_rad", self.joint_angle_rad, 1)))
         _store(self, "frequency_hz", _real("frequency_hz", self.frequency_hz, 1))
         response = _complex("response", self.response)
@@ -247,12 +248,11 @@ def model_response(
     """
     f = _real("frequency_hz", frequency_hz, 1)
     check_sampling(sampling)
-    if quantity not in ORDER:
-        raise InputError(f"quantity: expected one of {', '.join(ORDER)}, got {quantity!r}")
+    one_of("quantity", quantity, ORDER)
     at = robot.operating_point if joint_angle_rad is None else joint_angle_rad
     pairs = _core.frequency_response(
         robot.core,
-        core_effects(effects),
+        core_effects(robot.placed(effects)),
         [float(x) for x in at],
         f.tolist(),
         sampling == "zero_order_hold",

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from axisight.arguments import one_of
 from axisight.errors import InputError
 from axisight.frequency_fit.measured import Sampling, check_sampling
 from axisight.frf.pooled import check_neighbours
@@ -80,10 +81,7 @@ class FrequencyFitOptions:
 
     def __post_init__(self) -> None:
         """Check."""
-        if self.criterion not in CRITERIA:
-            raise InputError(
-                f"criterion: expected one of {', '.join(CRITERIA)}, got {self.criterion!r}"
-            )
+        one_of("criterion", self.criterion, CRITERIA)
         check_sampling(self.sampling)
         if self.loss not in ("squared", "huber", "soft_l1"):
             raise InputError(f"loss: expected squared, huber or soft_l1, got {self.loss!r}")

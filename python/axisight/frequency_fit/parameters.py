@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from axisight.arguments import did_you_mean
 from axisight.errors import InputError
 from axisight.fitting import Parameter, robot_parameters
 from axisight.robot import Robot
@@ -52,7 +53,9 @@ def _spec(item: str | Parameter | tuple[str, float], known: Mapping[str, float])
         return _from_parameter(item, known)
     name, start = item if isinstance(item, tuple) else (item, known.get(item, np.nan))
     if name not in known:
-        raise InputError(f"parameter {name!r}: expected one of {', '.join(known)}")
+        raise InputError(
+            f"parameter {name!r}: expected one of {', '.join(known)}{did_you_mean(name, known)}"
+        )
     if not isinstance(start, int | float | np.number) or not np.isfinite(start):
         raise InputError(f"{name}: expected a finite start, got {start!r}")
     start = float(start)
@@ -70,7 +73,9 @@ def _from_parameter(item: Parameter, known: Mapping[str, float]) -> Spec:
     if item.effect is not None:
         raise InputError(f"parameter {name!r}: expected a robot parameter, got one of an effect")
     if name not in known:
-        raise InputError(f"parameter {name!r}: expected one of {', '.join(known)}")
+        raise InputError(
+            f"parameter {name!r}: expected one of {', '.join(known)}{did_you_mean(name, known)}"
+        )
     numbers = (item.initial, item.lower, item.upper, *(item.prior or ()))
     if np.isnan(numbers).any() or not np.isfinite(item.initial):
         raise InputError(f"{name}: expected finite numbers, got {numbers}")

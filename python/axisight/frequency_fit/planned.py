@@ -140,7 +140,7 @@ def pose_information(
     options = FrequencyFitOptions(criterion="weighted_least_squares", sampling=sampling)
     return _core.frequency_information(
         robot.core,
-        core_effects(effects),
+        core_effects(robot.placed(effects)),
         list(chosen),
         poses,
         core_options(options),

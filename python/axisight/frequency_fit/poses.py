@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
+from axisight.display.summary import summarized
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.fitting import Parameter
@@ -23,6 +24,7 @@ from axisight.robot import Robot
 Real = NDArray[np.float64]
 
 
+@summarized
 @dataclass(frozen=True)
 class PoseChoice:
     """Operating points chosen for the most information.

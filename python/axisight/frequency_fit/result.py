@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from axisight import _core
 from axisight.display import html
+from axisight.display.summary import summarized
 from axisight.frequency_fit.trust import Trust
 from axisight.identifiability import Combination, Identifiability
 from axisight.robot import Robot
@@ -22,6 +23,7 @@ NORMAL_95 = 1.959963984540054
 STATUS_ADVICE = dict(_core.status_advice())
 
 
+@summarized
 @dataclass(frozen=True)
 class FrequencyFit:
     """Parameters fitted to frequency responses.
@@ -96,6 +98,7 @@ class FrequencyFit:
             html.table(
                 ("parameter", "value", "standard error", "95 % from", "to"),
                 zip(self.names, *(map(html.number, column) for column in columns), strict=True),
+                "Parameters with standard errors",
             ),
             html.lines(self.warnings),
         )
@@ -137,6 +140,7 @@ class FrequencyFit:
         )
 
 
+@summarized
 @dataclass(frozen=True)
 class Covariances:
     """Of the searched numbers, by the response's uncertainty and by blocks of residuals."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.display.summary import summarized
 from axisight.frequency_fit.measured import MeasuredResponse
 from axisight.frf.pooled import MISFIT_EXPLAINED, OwnWeights, few_words
 
@@ -20,6 +21,7 @@ CHANCE = 1e-3
 """Probability that the line furthest off in a fit is called an outlier by chance."""
 
 
+@summarized
 @dataclass(frozen=True)
 class Trust:
     """What speaks against standard deviations from the variance of the responses.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.arguments import instance, reals
+from axisight.display.summary import summarized
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.robot import Robot
@@ -17,6 +18,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
+@summarized
 @dataclass(frozen=True)
 class Loop:
     """The loop ``u = F (P r - y)``, ``y = G u`` of a robot at its operating point.

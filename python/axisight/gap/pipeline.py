@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from axisight.effects import Effect
 from axisight.gap.facts.result import Diagnosis
 from axisight.gap.facts.settings import Settings
-from axisight.gap.intake.prepared_logs import behind_gate, named_inputs
+from axisight.gap.intake.given import Given, check_options, given_inputs
+from axisight.gap.intake.prepared_logs import behind_gate
 from axisight.gap.measure.by_axis import believed_by_axis
 from axisight.gap.measure.torque_traces import signals_of
 from axisight.gap.screening.search_round import Progress
@@ -23,8 +25,13 @@ from axisight.gap.separate.waves import ExperimentLimits
 from axisight.gap.simulator.tolerances import loaded
 from axisight.gap.verdict.assembled import assembled
 from axisight.gap.verdict.validated import validated
-from axisight.logs import Case, Log
+from axisight.logs import AnyMap, Case, Log
 from axisight.robot import Robot
+
+LogLike = Log | Path | str | Any
+"""A log: its path, a `Log`, a pandas DataFrame, an xarray Dataset, or a mapping of names to arrays."""
+LogsLike = LogLike | Iterable[LogLike]
+"""One log or several."""
 
 
 def _silent(_label: str, _done: int, _total: int) -> None:
@@ -32,11 +39,13 @@ def _silent(_label: str, _done: int, _total: int) -> None:
 
 
 def diagnose(
-    case: Case | Path | str | None = None,
+    case: Case | Robot | LogsLike | None = None,
+    logs: LogsLike | None = None,
     *,
     robot: Robot | Path | str | None = None,
-    estimation: Sequence[Log] = (),
-    validation: Sequence[Log] = (),
+    estimation: LogsLike = (),
+    validation: LogsLike = (),
+    columns: AnyMap | Path | str | None = None,
     name: str | None = None,
     settings: Settings | None = None,
     progress: Progress = _silent,
@@ -44,34 +53,43 @@ def diagnose(
     to_show: Effect | None = None,
     within: ExperimentLimits | None = None,
     signals: bool = False,
-    simulated: Sequence[Log] = (),
+    simulated: LogsLike = (),
 ) -> Diagnosis:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks.
 
+    Call it as ``diagnose(case)``, or as ``diagnose(robot, logs, validation=...)``.
+
     Parameters
     ----------
-    case : a case, or the folder of one (``axisight.case/1``); or give
-    robot, estimation, validation : the simulator (or its file or preset), logs to
-        fit and choose on, and logs that only the final figures see.
+    case : a case or the folder of one (``axisight.case/1``); or the robot of ``logs``: a `Robot`, a
+        preset, or the path of a robot file, URDF or MJCF.
+    logs : estimation logs, one or a list. Each is a path, a `Log`, a pandas DataFrame or an xarray
+        Dataset; `axisight.logs.log_of_table` says how their columns are named. Without
+        ``validation`` the last log is held out, and ``Diagnosis.checks`` says so.
+    robot : the robot by name instead of first; beside a case, in place of the case's own.
+    estimation : ``logs`` by another name; the roles are then explicit, and nothing is held out unasked.
+    validation : logs that only the final figures see, given as ``logs`` are; beside a case they are
+        added to the case's own.
+    columns : column map of logs that are paths or tables, as in `axisight.read_log`.
     name : what to call the case.
     settings : tolerances of the simulator's parameters, thresholds, seed.
     progress : called with (what, done, total).
-    separate : also design the experiment that tells the causes apart which stay open,
-        ``Diagnosis.experiment`` (closed loop only).
-    to_show : design the one that shows this effect instead, of this size, if the machine has it.
-    within : limits of speed, travel and torque for either; by default what the logs show.
+    separate : also design the experiment that tells open causes apart, ``Diagnosis.experiment``
+        (closed loop only).
+    to_show : design the experiment that shows this effect, of this size, if the machine has it.
+    within : limits of speed, travel and torque for either experiment; by default what the logs show.
     signals : keep measured and simulated torques of all logs, ``Diagnosis.signals``.
-    simulated : logs of one's own simulator under the same references, or along the same motion, one for
-        each estimation log and then each validation log: how far the model reproduces it,
-        ``Diagnosis.simulator``; the gap is then that of this simulator, by inverse dynamics if motions
+    simulated : logs of your own simulator under the same references, or along the same motion: one for
+        each estimation log, then one for each validation log. ``Diagnosis.simulator`` says how far the
+        model reproduces it. The gap is then that of your simulator, by inverse dynamics if motions
         are alike.
 
     Returns
     -------
-    The diagnosis. Closed loop when the robot has a controller and every log its
-    velocity references, or none has and the gears are elastic (the references are then those for
-    which the controller commands the logged torque); inverse dynamics otherwise. The same input, settings
-    and version give the same result.
+    The diagnosis. It compares in closed loop if the robot has a controller and every log its velocity
+    references. It does so too if no log has references and the gears are elastic: the references are
+    then those for which the controller commands the logged torque. Otherwise it compares by inverse
+    dynamics. The same input, settings and version give the same result.
 
     Raises
     ------
@@ -79,13 +97,37 @@ def diagnose(
     of them, with the name of every fault, where logs or robot cannot be what they claim.
 
     """
+    check_options(settings)
+    given = given_inputs(case, logs, robot, estimation, validation, simulated, columns)
+    asked = Asking(separate, to_show, within)
+    found = _diagnosed(given, name or given.name, settings or Settings(), progress, asked, signals)
+    return replace(found, checks=(*given.says, *found.checks))
+
+
+@dataclass(frozen=True)
+class Asking:
+    """What is asked for beside the diagnosis; as in `diagnose`."""
+
+    separate: bool
+    to_show: Effect | None
+    within: ExperimentLimits | None
+
+
+def _diagnosed(
+    given: Given,
+    name: str,
+    chosen: Settings,
+    progress: Progress,
+    asking: Asking,
+    signals: bool,
+) -> Diagnosis:
+    """Return the diagnosis of a simulator and logs with roles."""
     started = time.monotonic()
-    chosen = settings or Settings()
-    found_name, source, fit_logs, held_logs = named_inputs(case, robot, estimation, validation)
-    machine, chosen = loaded(source, chosen, fit_logs[0].sample_time_s)
-    asked = asked_of(machine, separate, to_show, within)
+    fit_logs, held_logs = given.estimation, given.validation
+    machine, chosen = loaded(given.source, chosen, fit_logs[0].sample_time_s)
+    asked = asked_of(machine, asking.separate, asking.to_show, asking.within)
     progress("looking at the logs", 0, 1)
-    inputs = behind_gate(machine, fit_logs, held_logs, chosen.despite, simulated)
+    inputs = behind_gate(machine, fit_logs, held_logs, chosen.despite, given.simulated)
     progress("looking at the logs", 1, 1)
     inputs, view = inputs.compared(chosen)
     if asked is not None:
@@ -102,7 +144,7 @@ def diagnose(
     progress("measuring the gap", 0, 1)
     unknown = [one.axis for one in inputs.nominal]
     seen = validated(view, held_logs, found, unknown, chosen)
-    out = assembled(name or found_name, machine, view, held_logs, seen, chosen, inputs.noted)
+    out = assembled(name, machine, view, held_logs, seen, chosen, inputs.noted)
     progress("measuring the gap", 1, 1)
     if asked is not None:
         progress("designing an experiment", 0, 1)

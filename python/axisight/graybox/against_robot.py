@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.graybox.axis_findings import FAR, scale_words, total_inertia
@@ -14,6 +15,7 @@ from axisight.graybox.robot_values import converted, inertia_about, joint_of
 from axisight.robot import Robot
 
 
+@summarized
 @dataclass(frozen=True)
 class Comparison:
     """A fit against the values of a robot file.
@@ -28,7 +30,7 @@ class Comparison:
     findings: tuple[str, ...]
 
 
-def compare_with_robot(fit: AxisFit, robot: Robot, axis: int = 1) -> Comparison:
+def compare_with_robot(fit: AxisFit, robot: Robot, axis: int | str = 1) -> Comparison:
     """Compare the fit of an axis with what the robot has there.
 
     fit
@@ -36,7 +38,7 @@ def compare_with_robot(fit: AxisFit, robot: Robot, axis: int = 1) -> Comparison:
     robot
         With a gear spring at the axis; its operating point counts.
     axis
-        Number of the axis, from 1.
+        Number of the axis from 1, or the name of its joint.
 
     Degrees instead of radians, torque in mNm or on the other side of the gear multiply inertias
     and stiffness by one common factor, and the fit is as good as ever. Raises InputError for an

@@ -12,6 +12,8 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
+from axisight.arguments import one_of
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 
 Array = NDArray[np.float64]
@@ -39,6 +41,7 @@ class AxisParameter:
     neutral: float | None = None
 
 
+@summarized
 @dataclass(frozen=True)
 class AxisModel:
     """Structure of the model of one axis, thesis (9.4)-(9.9), for two or more masses.
@@ -92,9 +95,9 @@ class AxisModel:
         """Check the structure and fill in what depends on the number of masses."""
         _whole("n_masses", self.n_masses, 2, MOST_MASSES)
         _whole("substeps", self.substeps, 1, 1000)
-        _choice("output", self.output, tuple(OUTPUT_UNIT))
-        _choice("hold", self.hold, ("zero", "first"))
-        _choice("initial", self.initial, ("rest", "free"))
+        one_of("output", self.output, tuple(OUTPUT_UNIT))
+        one_of("hold", self.hold, ("zero", "first"))
+        one_of("initial", self.initial, ("rest", "free"))
         if not (np.isfinite(self.gear_ratio) and self.gear_ratio > 0):
             raise InputError(
                 "gear_ratio: expected a positive number, joint angle per motor angle (a gear of "
@@ -293,6 +296,7 @@ class CoreModel:
     substeps: int
 
 
+@summarized
 @dataclass(frozen=True)
 class AxisData:
     """A record of one axis: motor torque and motor velocity or position at uniform samples.
@@ -411,8 +415,3 @@ def _whole(field: str, value: object, least: int, most: int) -> None:
     good = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not good or not least <= int(value) <= most:  # type: ignore[call-overload]
         raise InputError(f"{field}: expected a whole number from {least} to {most}, got {value!r}")
-
-
-def _choice(field: str, value: object, known: Sequence[str]) -> None:
-    if value not in known:
-        raise InputError(f"{field}: expected one of {', '.join(known)}, got {value!r}")

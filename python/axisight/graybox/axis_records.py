@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from axisight.errors import InputError
 from axisight.graybox.axis_model import AxisData
 from axisight.logs import Log
+from axisight.robot.axis_names import axis_number
 
 Real = NDArray[np.float64]
 
@@ -21,8 +22,7 @@ def axis_data(log: Log, axis: int = 1) -> AxisData:
     the velocity: models of it have ``output="velocity_difference"``. Raises InputError for an
     axis the log does not have.
     """
-    if isinstance(axis, bool) or axis not in range(1, log.n_axes + 1):
-        raise InputError(f"axis: expected 1 to {log.n_axes}, got {axis!r}")
+    axis = axis_number(axis, log.n_axes)
     position = log.position_rad[:, axis - 1]
     velocity = np.diff(position, prepend=position[:1]) / log.sample_time_s
     torque = log.torque_nm[:, axis - 1]

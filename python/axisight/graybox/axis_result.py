@@ -11,8 +11,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight import _core
+from axisight.arguments import one_of
 from axisight.blackbox import fit_percent
 from axisight.display import html
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.graybox.axis_findings import (
     covariance_findings,
@@ -47,6 +49,7 @@ STATUS_ADVICE = _SEARCH_ADVICE | {
 }
 
 
+@summarized
 @dataclass(frozen=True)
 class NoiseModel:
     """How the prediction errors were made white.
@@ -60,6 +63,7 @@ class NoiseModel:
     whitening: tuple[float, ...] = ()
 
 
+@summarized
 @dataclass(frozen=True)
 class AxisFit:
     """Result of `fit_axis`.
@@ -149,8 +153,7 @@ class AxisFit:
         ``"sandwich"`` does not; ``"trusted"`` is the one of them that ``trusted`` names. The
         sandwich of few blocks is itself uncertain: its quantiles are those of Student.
         """
-        if name not in self.free:
-            raise InputError(f"name: expected one of {', '.join(self.free)}, got {name!r}")
+        one_of("name", name, self.free)
         if kind not in ("trusted", "white", "sandwich"):
             raise InputError(f"kind: expected trusted, white or sandwich, got {kind!r}")
         chosen = self.trusted if kind == "trusted" else kind

@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.blackbox.rational import fit_rational
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.frf.response import frequency_response
 from axisight.graybox.collocated import Collocated, collocated, standard_errors
@@ -31,6 +32,7 @@ _AT_END = 0.01
 _BEYOND = 1.2
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class ChainFit:
     """A chain of masses that fits a response.

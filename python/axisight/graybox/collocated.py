@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.frf.confidence import median_freedom
 from axisight.frf.pooled import neighbours_for, pooled_variance
@@ -24,6 +25,7 @@ _FEWEST_LINES = 8
 _MODEL_FLOOR = 0.05
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Collocated:
     """Lines of one axis that can be used.

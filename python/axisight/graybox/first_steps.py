@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.frf.etfe import etfe
 from axisight.graybox.axis_model import AxisData
@@ -36,6 +37,7 @@ _LEAST_DAMPING = 0.01
 """Twice the damping ratio of a mass on its spring, at which a chain starts at least."""
 
 
+@summarized
 @dataclass(frozen=True)
 class InitialModel:
     """What steps 1 and 2 found.

@@ -14,6 +14,7 @@ import scipy
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.graybox.collocated import collocated
 from axisight.graybox.landmarks import (
@@ -30,6 +31,7 @@ Real = NDArray[np.float64]
 _ALIKE = 1.1
 
 
+@summarized
 @dataclass(frozen=True)
 class Flexibility:
     """Two-mass values that one frequency response gives, with standard errors.
@@ -166,6 +168,7 @@ def _findings(
     return tuple(found)
 
 
+@summarized
 @dataclass(frozen=True)
 class CubicSpring:
     """Spring torque k1 x + k3 x^3 from stiffnesses at several amplitudes.

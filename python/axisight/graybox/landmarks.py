@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.graybox.collocated import Collocated, standard_errors
 
@@ -25,6 +26,7 @@ _LARGEST_STEP = 0.25
 _PASSES = 4
 
 
+@summarized
 @dataclass(frozen=True)
 class Landmark:
     """A notch or a resonance.
@@ -44,6 +46,7 @@ class Landmark:
     n_lines: int
 
 
+@summarized
 @dataclass(frozen=True)
 class HighFrequencyGain:
     """Level of torque to acceleration far above the resonances, 1 / J_m.

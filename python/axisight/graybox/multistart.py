@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from axisight import _core
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.graybox.axis_checks import data_warnings
 from axisight.graybox.axis_findings import start_findings
@@ -21,6 +22,7 @@ from axisight.graybox.prediction_error import prepare
 from axisight.statistics.starts import StartRange, drawn_start
 
 
+@summarized
 @dataclass(frozen=True)
 class AxisMultistart:
     """Result of `multistart_axis`.

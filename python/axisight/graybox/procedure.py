@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.display import html
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.graybox.axis_model import AxisData, AxisModel
 from axisight.graybox.axis_records import as_data, reference_of
@@ -29,6 +30,7 @@ _LAG_S = 0.005
 """Spacing of the lags of residual tests: a robot's motion has little beyond 100 Hz."""
 
 
+@summarized
 @dataclass(frozen=True)
 class AxisIdentification:
     """Result of :func:`identify_axis`: the values of each step.
@@ -62,7 +64,7 @@ class AxisIdentification:
         names = [data.name for data in self.data_sets]
         rows = ((name, *fit) for name, fit in zip(names, fits, strict=True))
         return self.fit._repr_html_() + html.table(
-            ("record", "fit of steps 1 and 2 [%]", "of step 3 [%]"), rows
+            ("record", "fit of steps 1 and 2 [%]", "of step 3 [%]"), rows, "Fit of each record"
         )
 
     def report(self) -> str:

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.arguments import instance
 from axisight.effects import Effect
 from axisight.effects.stated import of_axis_fit
 from axisight.errors import InputError
@@ -49,7 +50,7 @@ def identified_axis(
     robot: Robot,
     provenance: Provenance,
     *,
-    axis: int = 1,
+    axis: int | str = 1,
     covariance: Covariance = "trusted",
     smoothing_rad_s: float | None = None,
 ) -> Identified:
@@ -84,7 +85,7 @@ def identified_axis(
     provenance
         Where they come from.
     axis
-        Number of the axis, from 1.
+        Number of the axis from 1, or the name of its joint.
     covariance
         Which one of the fit: ``"trusted"`` (by its ``trusted``), ``"sandwich"`` or ``"white"``; to
         first order through the conversion. The sandwich of few blocks is unknown, and so are
@@ -99,6 +100,7 @@ def identified_axis(
     """
     if not isinstance(fit, AxisFit):
         raise InputError(f"fit: expected an AxisFit, got {type(fit).__name__}")
+    axis = instance("robot", robot, Robot).axis_number(axis)
     joint, ratio = joint_of(robot, axis)
     spread, kind = _spread(fit, covariance)
     width = _width(fit, smoothing_rad_s)
@@ -169,10 +171,9 @@ def _same_ratio(own: float, ratio: float) -> bool:
     return bool(np.isclose(own, ratio, rtol=1e-12, atol=0.0))
 
 
-def joint_of(robot: Robot, axis: int) -> tuple[str, float]:
-    """Name of the joint of an axis and the size of its gear ratio."""
-    if isinstance(axis, bool) or axis not in range(1, robot.n_axes + 1):
-        raise InputError(f"axis: expected 1 to {robot.n_axes}, got {axis!r}")
+def joint_of(robot: Robot, axis: int | str) -> tuple[str, float]:
+    """Return the name of the joint of an axis and the size of its gear ratio."""
+    axis = robot.axis_number(axis)
     joint = robot.axis_names[axis - 1]
     if f"{joint}.stiffness" not in robot_parameters(robot):
         raise InputError(

@@ -15,12 +15,14 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class SpringMassChain:
     """Masses in a row, neighbours joined by spring and damper, both ends free.

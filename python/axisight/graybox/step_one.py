@@ -12,6 +12,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from axisight.arguments import series_pair
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.logs.filters import lowpass
 from axisight.statistics.least_squares import condition, unit_columns
@@ -26,6 +27,7 @@ _LEAST_SHARE = 0.02
 _LARGEST_CONDITION = 1e3
 
 
+@summarized
 @dataclass(frozen=True)
 class RigidBodyFriction:
     """Estimate of (9.12), motor side, with standard errors.

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from axisight import blackbox
 from axisight.arguments import series_pair
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.statistics.correlation import (
     covariance_spread,
@@ -46,6 +47,7 @@ def fit_percent(measured: ArrayLike, simulated: ArrayLike) -> float:
     return float(blackbox.fit_percent(y, model)[0])
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class ResidualTests:
     """What the residuals say about a model.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse import csgraph
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.identifiability.information import Array, Information
 from axisight.statistics.least_squares import unit_columns
@@ -28,6 +29,7 @@ TILT = 0.05
 SIMPLE_POWERS = (0.5, 1.0, 2.0, 3.0)
 
 
+@summarized
 @dataclass(frozen=True)
 class Combination:
     """Parameters that are entangled, and what of them is seen.
@@ -64,6 +66,7 @@ class Combination:
         return f"only {known} {'is' if len(self.seen) == 1 else 'are'} known well; {several} trade off, to {worst}"
 
 
+@summarized
 @dataclass(frozen=True)
 class Identifiability:
     """What an experiment tells.

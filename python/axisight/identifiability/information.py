@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import linalg
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 
 Array = NDArray[np.float64]
 
 
+@summarized
 @dataclass(frozen=True)
 class Information:
     """The Fisher information of an experiment, as a root: M = ``root``^T ``root``.

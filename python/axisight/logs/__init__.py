@@ -21,6 +21,7 @@ from axisight.logs.patterns import AxisPattern, ColumnPattern
 from axisight.logs.reading import read_log
 from axisight.logs.render import render
 from axisight.logs.run_up import RunUp
+from axisight.logs.tables import log_of_table
 from axisight.logs.validate import check_same_rate
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "decimate_zero_phase",
     "differentiate",
     "load_column_map",
+    "log_of_table",
     "lowpass",
     "named_map_text",
     "parse_column_map",

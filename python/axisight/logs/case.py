@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.arguments import shown, usable_path
 from axisight.display import html
+from axisight.display.summary import summarized
 from axisight.documents import parse_toml, read_text
 from axisight.errors import CaseError
 from axisight.logs.columns import describe_validation
@@ -47,6 +48,7 @@ class _CaseFile(_Strict):
     log: tuple[_LogEntry, ...] = ()
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Case:
     """A case with its logs in the file's order; `roles` runs parallel to `logs`."""
@@ -71,7 +73,7 @@ class Case:
         ]
         head = ("log", "for", "duration", "rate", "axes")
         return html.page(
-            self.name, html.table(head, rows), html.lines([f"robot {self.robot_path}"])
+            self.name, html.table(head, rows, "Logs"), html.lines([f"robot {self.robot_path}"])
         )
 
     @property

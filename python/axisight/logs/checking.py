@@ -10,6 +10,7 @@ import numpy as np
 
 from axisight.arguments import short
 from axisight.display import html
+from axisight.display.summary import summarized
 from axisight.errors import LogError
 from axisight.logs.findings import Finding
 from axisight.logs.gather import Channel, Gathered, gather
@@ -35,6 +36,7 @@ _UNITS = {
 _GRAVEST = ("error", "warning", "ok")
 
 
+@summarized
 @dataclass(frozen=True)
 class LogReport:
     """What `check_log` found; rate, samples and axes are None where they could not be found out."""
@@ -56,7 +58,7 @@ class LogReport:
         ]
         verdict = "can be read" if self.ok else "cannot be read"
         title = ", ".join(filter(None, [f"{self.path}: {verdict}", *known]))
-        return html.page(title, html.table(("", "what", "finding"), rows))
+        return html.page(title, html.table(("severity", "column", "finding"), rows, "Findings"))
 
     @property
     def ok(self) -> bool:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.arguments import short, shown, usable_path
+from axisight.arguments import did_you_mean, short, shown, usable_path
 from axisight.errors import LogError
 from axisight.logs.budget import Budget
 from axisight.logs.columns import UNKNOWN, Address, AxisColumns, ColumnMap
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 _FIELDS = tuple(AxisColumns.model_fields)
 # Arrays as long as the stamps that looking at these takes.
 _TIME_COST = 4
+# What arrays may take that are in memory already.
+_ENOUGH = 2**62
 Channel = tuple[str, int]
 """Field of an axis (`position`, `torque`, ...) and 0-based axis."""
 
@@ -84,9 +86,25 @@ def gather(
     mapped columns may declare. Raises LogError when the file or the map itself cannot be used.
     """
     path = usable_path(path, LogError)
-    budget = Budget(max_bytes)
     given = load_column_map(columns) if isinstance(columns, Path | str) else columns
-    files = _Files(path, given, budget)
+    files = _Files(path, given, Budget(max_bytes))
+    return _gathered(files, path, given, robot)
+
+
+def gather_arrays(
+    arrays: Mapping[str, NDArray[Any]], name: str, columns: AnyMap, robot: Robot | None = None
+) -> Gathered:
+    """Take every mapped signal out of arrays that are there already; ``name`` is what messages call them.
+
+    Problems of single columns become findings, as in `gather`.
+    """
+    path = Path(name)
+    files = _Files(path, columns, Budget(_ENOUGH), LazyArrays.of(arrays))
+    return _gathered(files, path, columns, robot)
+
+
+def _gathered(files: _Files, path: Path, given: AnyMap | None, robot: Robot | None) -> Gathered:
+    budget = files.budget
     chosen = _usual_map(files.main, robot, path) if given is None else given
     pattern = chosen if isinstance(chosen, ColumnPattern) else None
     if isinstance(chosen, ColumnPattern):
@@ -179,12 +197,14 @@ def _to_motors(result: Gathered, robot: Robot) -> None:
 class _Files:
     """The log's own arrays and those of sibling files, each file opened once."""
 
-    def __init__(self, path: Path, columns: AnyMap | None, budget: Budget) -> None:
+    def __init__(
+        self, path: Path, columns: AnyMap | None, budget: Budget, main: LazyArrays | None = None
+    ) -> None:
         self._folder = path.parent
         self._csv = columns.csv if columns is not None else None
         self.budget = budget
         self._opened: dict[str, LazyArrays] = {}
-        self.main = load_arrays(path, self._csv, budget)
+        self.main = load_arrays(path, self._csv, budget) if main is None else main
 
     def of(self, address: Address) -> LazyArrays:
         if address.file is None:
@@ -253,7 +273,8 @@ def _vector(arrays: Mapping[str, NDArray[Any]], address: Address, budget: Budget
     """Return the addressed values as 1-D float64; raise LogError saying expected and got."""
     if address.name not in arrays:
         listed = ", ".join(map(short, list(arrays)[:12])) or "nothing"
-        raise LogError(f"expected a column named {shown(address.name)}, got {listed}")
+        meant = did_you_mean(address.name, arrays)
+        raise LogError(f"expected a column named {shown(address.name)}, got {listed}{meant}")
     values: Any = arrays[address.name]
     if address.index is not None:
         try:

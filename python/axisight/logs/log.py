@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from axisight.arguments import not_negative, positive
 from axisight.display import html
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.logs.run_up import RunUp
 
@@ -42,6 +43,7 @@ def not_logged(shape: tuple[int, ...]) -> Floats:
     return np.full(shape, np.nan)
 
 
+@summarized
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Log:
     """A run of `n` samples on `axes` driven axes.
@@ -112,25 +114,41 @@ class Log:
                 f"nominal_nm_a: expected {shape[1]} entries, got {len(self.nominal_nm_a)}"
             )
 
+    def _summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """Return a title and rows for the repr: signals with range and unit."""
+        rows = [
+            (f"{name} {axis}", f"{low} to {high} {unit}")
+            for name, axis, unit, low, high in self._ranges()
+        ]
+        return f"Log {self._title()}", [*rows, ("from", str(self.source))]
+
     def _repr_html_(self) -> str:
         """Signals with unit and range on every axis, for notebooks."""
+        head = ("signal", "axis", "unit", "least", "largest")
+        return html.page(
+            self._title(),
+            html.table(head, self._ranges(), "Signals"),
+            html.lines([f"from {self.source}", *self.notes]),
+        )
+
+    def _title(self) -> str:
+        return (
+            f"{self.name}: {self.duration_s:g} s, {self.n_samples} samples at "
+            f"{self.sample_rate_hz:.6g} Hz, {self.n_axes} axes"
+        )
+
+    def _ranges(self) -> list[tuple[str, ...]]:
+        """Return signal, axis, unit, least and largest value of what was logged."""
         rows = []
         for field, (name, _, _) in _VARIABLES.items():
             found = getattr(self, field)
-            if found is None:
-                continue
-            for i in range(self.n_axes):
+            for i in range(0 if found is None else self.n_axes):
                 there = found[np.isfinite(found[:, i]), i]
-                span = (there.min(), there.max()) if there.size else (math.nan, math.nan)
-                unit = self._unit(field, i)
                 if there.size:
-                    rows.append((name, str(i + 1), unit, *map(html.number, span)))
-        return html.page(
-            f"{self.name}: {self.duration_s:g} s, {self.n_samples} samples at "
-            f"{self.sample_rate_hz:.6g} Hz, {self.n_axes} axes",
-            html.table(("signal", "axis", "unit", "least", "largest"), rows),
-            html.lines([f"from {self.source}", *self.notes]),
-        )
+                    unit = self._unit(field, i)
+                    span = map(html.number, (there.min(), there.max()))
+                    rows.append((name, str(i + 1), unit, *span))
+        return rows
 
     def _unit(self, field: str, axis: int) -> str:
         """Return the unit of a field on an axis (from 0)."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from axisight.arguments import shown, usable_path
+from axisight.arguments import did_you_mean, shown, usable_path
 from axisight.documents import parse_toml, read_text
 from axisight.errors import LogError
 from axisight.logs.columns import ColumnMap, describe_validation
@@ -43,7 +43,8 @@ def needs_robot(columns: AnyMap) -> bool:
 def named_map_text(name: str) -> str:
     """Return the TOML of a map that ships with the package. Raises LogError listing their names."""
     if name not in MAPS:
-        raise LogError(f"column map: expected one of {', '.join(MAPS)}, got {shown(name)}")
+        meant = did_you_mean(name, MAPS)
+        raise LogError(f"column map: expected one of {', '.join(MAPS)}, got {shown(name)}{meant}")
     return _shipped(name).read_text("utf-8")
 
 
@@ -61,6 +62,7 @@ def load_column_map(path: Path | str) -> AnyMap:
     except (OSError, UnicodeDecodeError) as error:
         raise LogError(
             f"{path}: column map cannot be read: expected a file or one of {', '.join(MAPS)}: {error}"
+            f"{did_you_mean(str(path), MAPS)}"
         ) from error
     return parse_column_map(text, where=str(path))
 

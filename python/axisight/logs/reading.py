@@ -49,7 +49,19 @@ def read_log(
     jitter beyond 1 % of a sample; a declared rate that the stamps contradict; less than one
     second; another number of axes than `n_axes`; more declared than `max_bytes`.
     """
-    found = gather(path, columns, robot, max_bytes)
+    return log_of(
+        gather(path, columns, robot, max_bytes), n_axes=n_axes, robot=robot, currents=currents
+    )
+
+
+def log_of(
+    found: Gathered,
+    *,
+    n_axes: int | None = None,
+    robot: Robot | None = None,
+    currents: bool = False,
+) -> Log:
+    """Return the log of gathered signals; options and what is raised as in `read_log`."""
     if found.columns.side == "joint" and robot is None:
         raise LogError(
             f"{found.path}: side: expected a robot, whose gear ratios turn signals of joints into those of "

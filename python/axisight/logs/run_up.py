@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 
 Floats = NDArray[np.float64]
 
 
+@summarized
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunUp:
     """Samples before a log, which are simulated and not compared; the first is at rest.

@@ -37,6 +37,12 @@ def freeze(study: Study) -> str:
     robot = load_robot(study.robot)
     design = study.model_dump(by_alias=True, mode="json", exclude={"seed", "runs", "name", "robot"})
     design["statistics"].pop("quantiles")
+    for entry in design["effect"]:
+        try:
+            (effect,) = robot.placed([Effect(**entry)])
+        except InputError as error:
+            raise StudyError(str(error)) from None
+        entry |= {"axis": effect.axis, "axes": None if effect.axes is None else list(effect.axes)}
     design["robot"] = {"toml": robot.toml}
     design["axisight_version"] = version("axisight")
     return json.dumps(design, sort_keys=True)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
+from axisight.display.summary import summarized
 from axisight.montecarlo.design import compute_block, core_study, freeze
 from axisight.montecarlo.study import Study
 
 
+@summarized
 @dataclass(frozen=True)
 class Estimate:
     """Time [s] and room on disk [bytes] of a whole study; it prints as a phrase."""

@@ -6,7 +6,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from axisight.display.summary import summarized
 
+
+@summarized
 @dataclass(frozen=True)
 class Progress:
     """State of a study.

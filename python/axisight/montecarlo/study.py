@@ -19,6 +19,7 @@ NotNegative = Annotated[float, Field(ge=0)]
 # What numbers of the core can hold; how long all of it may be is said by the core.
 Count = Annotated[int, Field(ge=0, le=10**9)]
 AtLeastOne = Annotated[int, Field(ge=1, le=10**9)]
+JointName = Annotated[str, Field(min_length=1, max_length=200)]
 Runs = Annotated[int, Field(ge=1, le=10**8)]
 Seed = Annotated[int, Field(ge=0, lt=2**64)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -100,11 +101,11 @@ class Measurement(_Model):
 
 
 class EffectEntry(_Model):
-    """An effect at work, as :class:`axisight.Effect`."""
+    """An effect at work, as :class:`axisight.Effect`: its axis is a number from 1 or a joint name."""
 
     name: str
-    axis: AtLeastOne | None = None
-    axes: tuple[AtLeastOne, AtLeastOne] | None = None
+    axis: AtLeastOne | JointName | None = None
+    axes: tuple[AtLeastOne | JointName, AtLeastOne | JointName] | None = None
     parameters: dict[str, float] = {}
 
 
@@ -181,7 +182,7 @@ class Study(_Model):
         rows += [("spread", spread)] if spread else []
         return html.page(
             f"{self.name}: {self.runs} runs of {self.robot}, seed {self.seed}",
-            html.table(("part", "settings"), rows),
+            html.table(("part", "settings"), rows, "Settings of the study"),
         )
 
     def changed(self, **changes: Any) -> Study:

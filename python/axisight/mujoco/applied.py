@@ -16,6 +16,7 @@ from axisight.mujoco.end_of_step import torque_at_end
 from axisight.mujoco.gears import Gear
 from axisight.mujoco.joints import Axes, axes_of, springs_of
 from axisight.mujoco.torques import EffectTorques, acts_in_gear, check_applicable
+from axisight.robot.axis_names import effect_on
 
 Array = NDArray[np.float64]
 
@@ -67,6 +68,7 @@ def apply(
             f"gear_ratio: expected one, or one of each of {len(axes.dofs)} joints, got shape {ratio.shape}"
         )
     ratio = np.broadcast_to(ratio, axes.dofs.shape)
+    effects = [_placed(model, axes, effect) for effect in effects]
     torques, inside = _torques(tuple(effects), tuple(ratio.tolist()), springs_of(model, axes))
     acting = [i for i in range(len(axes.dofs)) if any(e.axis == i + 1 for e in effects)]
     dofs = axes.dofs[acting]
@@ -95,6 +97,14 @@ def apply(
     out = np.asarray(found + known - in_gears + at_end)
     data.qfrc_applied[dofs] = out[acting]
     return out
+
+
+def _placed(model: Any, axes: Axes, effect: Effect) -> Effect:
+    """Return an effect with the number of its axis in place of the name of its joint."""
+    if not effect.joints:
+        return effect
+    names = [model.joint(int(model.dof_jntid[dof])).name for dof in axes.dofs]
+    return effect_on(effect, names)
 
 
 @lru_cache(maxsize=64)

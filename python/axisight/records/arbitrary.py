@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from axisight.arguments import Real, positive, words
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.records.signal_checks import recorded
 
 _AXES = ("experiment", "sample", "channel")
 
 
+@summarized
 @dataclass(frozen=True)
 class ArbitraryRecords:
     """Experiments of equal length at one operating point, under any excitation.

@@ -15,12 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from axisight.arguments import Complex, Lines, Real, instance, lines_below, reals, switch
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.records.periodic import PeriodicRecords
 
 _LEAST_FIT = 0.9  # mean resultant length of the phases that are left
 
 
+@summarized
 @dataclass(frozen=True)
 class Delay:
     """A delay against the excitation.

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from axisight.arguments import Real, instance, one_of, positive, real_array, words
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.logs import Log
 from axisight.records.signal_checks import recorded
 
 
+@summarized
 @dataclass(frozen=True)
 class Experiment:
     """Signals of one experiment on a uniform time grid.

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from axisight.display.summary import summarized
+
 
 class FindingKind(StrEnum):
     """What a finding is about."""
@@ -31,6 +33,7 @@ class FindingKind(StrEnum):
     """A linear drift was removed."""
 
 
+@summarized
 @dataclass(frozen=True)
 class RecordFinding:
     """One observation about the records.

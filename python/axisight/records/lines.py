@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from axisight.arguments import Lines, Real, between, number, reals
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 
 _HALF_WIDTH = 10  # lines on either side that share one noise level
 
 
+@summarized
 @dataclass(frozen=True)
 class ExcitedLines:
     """Lines found to be excited.

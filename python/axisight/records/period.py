@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 from axisight.arguments import Real, reals
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.records.lines import repeating_lines
 
@@ -16,6 +17,7 @@ _LEAST_REPETITION = 0.5  # as much noise as signal
 _INTEGER_TOLERANCE = 0.05  # samples over the whole record
 
 
+@summarized
 @dataclass(frozen=True)
 class Period:
     """A period and how sure it is.

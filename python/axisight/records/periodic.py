@@ -13,12 +13,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from axisight.arguments import Lines, Real, lines_below, positive, words
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.records.signal_checks import recorded
 
 _AXES = ("experiment", "period", "sample", "channel")
 
 
+@summarized
 @dataclass(frozen=True)
 class PeriodicRecords:
     """Whole periods of several experiments at one operating point.

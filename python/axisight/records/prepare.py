@@ -21,6 +21,7 @@ from axisight.arguments import (
     whole,
     words,
 )
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.logs import Log
 from axisight.records.checks import check_clipping, check_repetition, keep_steady
@@ -37,6 +38,7 @@ _CLEAR_MARGIN_DB = 6.0
 _DRIFT_WORTH_SAYING = 1e-3  # of the RMS, a period
 
 
+@summarized
 @dataclass(frozen=True)
 class Prepared:
     """Records ready for estimation, and how they came about.

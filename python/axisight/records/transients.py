@@ -10,6 +10,7 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight.arguments import Real, between, positive, reals, whole
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 
 Complex = NDArray[np.complex128]
@@ -53,6 +54,7 @@ def waiting_time_s(time_constant_s: float, record_s: float, signal_to_noise: flo
     return wait
 
 
+@summarized
 @dataclass(frozen=True)
 class SteadyState:
     """The judgement of :func:`steady_state`.

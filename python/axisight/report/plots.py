@@ -8,11 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from axisight.arguments import one_of
 from axisight.errors import InputError
 from axisight.gap.facts.result import Diagnosis, Overlay
 from axisight.logs import Log
 from axisight.palette import AFTER, BEFORE, MEASURED, cell_colors
 from axisight.report.wording import GapMap, gap_maps, ranked, share_limit, title_of
+from axisight.robot.axis_names import axis_number
 
 
 def _panels(
@@ -112,12 +114,14 @@ def plot_ranking(diagnosis: Diagnosis, count: int = 10) -> Figure:
     return figure
 
 
-def plot_overlay(diagnosis: Diagnosis, log: str | None = None, axis: int | None = None) -> Figure:
+def plot_overlay(
+    diagnosis: Diagnosis, log: str | None = None, axis: int | str | None = None
+) -> Figure:
     """Plot measured torque and the simulator before and after, on a held-out log.
 
-    ``log`` and ``axis`` (1-based) choose what to show; default the first log and
-    the axis of the first cause. Returns a Figure; raises InputError for a log or
-    axis the diagnosis does not have.
+    ``log`` and ``axis`` choose what to show. ``axis`` is a number from 1 or a joint name. The default
+    is the first log and the axis of the first cause. Returns a Figure. Raises InputError for a log or
+    an axis that the diagnosis does not have.
     """
     item = _chosen(diagnosis, log, axis)
     figure = Figure(figsize=(10, 4.5), layout="constrained")
@@ -134,15 +138,15 @@ def plot_overlay(diagnosis: Diagnosis, log: str | None = None, axis: int | None 
     return figure
 
 
-def _chosen(diagnosis: Diagnosis, log: str | None, axis: int | None) -> Overlay:
+def _chosen(diagnosis: Diagnosis, log: str | None, axis: int | str | None) -> Overlay:
     logs = list(dict.fromkeys(o.log for o in diagnosis.overlays))
     axes = sorted({o.axis for o in diagnosis.overlays})
     if not logs:
         raise InputError("diagnosis: expected overlays, got none")
     named = next((c.axis for c in diagnosis.causes if c.axis is not None), axes[0])
     log, axis = log or logs[0], named if axis is None else axis
-    if log not in logs:
-        raise InputError(f"log: expected one of {', '.join(logs)}, got {log!r}")
+    one_of("log", log, logs)
+    axis = axis_number(axis, diagnosis.joints or max(axes))
     if axis not in axes:
         raise InputError(f"axis: expected one of {', '.join(map(str, axes))}, got {axis}")
     return next(o for o in diagnosis.overlays if o.log == log and o.axis == axis)

@@ -14,6 +14,7 @@ import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
+from axisight.display.summary import summarized
 from axisight.errors import AxisightError, InputError
 from axisight.rigid_body.coupling import MotorCoupling
 from axisight.rigid_body.friction import DriveTerms, Side
@@ -31,6 +32,7 @@ TOLERANCE = 1e-5
 LEAST_GAP = 100.0
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
     """Base parameters of a torque model, and the way to them and back.

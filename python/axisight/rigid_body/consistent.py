@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from axisight import _core
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.rigid_body.base import free_columns
 from axisight.rigid_body.estimate import numbers, row_weights
@@ -47,6 +48,7 @@ _ADVICE: dict[str, str] = {
 }
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class ConsistentParameters:
     """Parameters of bodies that can exist, and what that cost.

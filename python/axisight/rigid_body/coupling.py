@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class MotorCoupling:
     """How the motors of all driven axes are coupled to their joints.

@@ -19,6 +19,7 @@ import scipy.integrate
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
+from axisight.display.summary import summarized
 from axisight.errors import IdentifiabilityError, IdentificationWarning, InputError
 from axisight.rigid_body import checks
 from axisight.rigid_body.base import BaseParameters
@@ -38,6 +39,7 @@ from axisight.statistics.least_squares import condition
 Array = NDArray[np.float64]
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class EnergyRegression:
     """Equations of the energy model, one per window.
@@ -56,6 +58,7 @@ class EnergyRegression:
     stop: NDArray[np.intp]
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class EnergyEstimate:
     """Base parameters from the energy model.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
+from axisight.arguments import one_of
 from axisight.errors import IdentifiabilityError, IdentificationWarning, InputError
 from axisight.rigid_body import checks
 from axisight.rigid_body.base import BaseParameters, base_parameters
@@ -107,8 +108,8 @@ def identify_rigid_body(
     IdentifiabilityError for data that do not determine the parameters.
 
     """
-    _check_choice("method", method, ("ls", "wls", "tls"))
-    _check_choice("deficient", deficient, ("raise", "group"))
+    one_of("method", method, ("ls", "wls", "tls"))
+    one_of("deficient", deficient, ("raise", "group"))
     if eliminate is not None and not (np.isfinite(eliminate) and eliminate > 0):
         raise InputError(f"eliminate: expected a positive number, got {eliminate!r}")
     model = as_model(robot, terms, side, coupling)
@@ -360,8 +361,3 @@ def default_blocks(blocks: int | None, n: int, least: int = 20) -> int:
     if not 2 <= blocks <= n:
         raise InputError(f"blocks: expected 2 to {n}, the number of samples, got {blocks}")
     return int(blocks)
-
-
-def _check_choice(field: str, value: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise InputError(f"{field}: expected one of {', '.join(choices)}, got {value!r}")

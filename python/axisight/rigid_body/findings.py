@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from axisight.display.summary import summarized
+
 
 class FindingKind(StrEnum):
     """What a finding is about."""
@@ -35,6 +37,7 @@ class FindingKind(StrEnum):
     """Parameters were set to zero because the data do not show them."""
 
 
+@summarized
 @dataclass(frozen=True)
 class IdentificationFinding:
     """One observation about a regression.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.excitation import References, write_references
 from axisight.excitation.checks import whole_samples
@@ -18,6 +19,7 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class FourierTrajectory:
     """Angles of the driven joints as finite Fourier series, joint side.

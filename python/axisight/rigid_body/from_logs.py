@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.display import html
+from axisight.display.summary import summarized
 from axisight.effects.stated import friction_corner
 from axisight.errors import IdentificationWarning, InputError
 from axisight.logs import Log
@@ -41,6 +42,7 @@ Array = NDArray[np.float64]
 Motion = tuple[Array, Array, Array, Array]
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class LogIdentification:
     """What :func:`identify_logs` found.

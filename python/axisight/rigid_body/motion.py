@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.logs.filters import lowpass
 
@@ -27,6 +28,7 @@ _JUMP = 4.0
 """A step from the last sample to the first this many times the largest inside is no period."""
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class MotionEstimate:
     """A motion without its noise, ready for a regression.

@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight.display import html
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.rigid_body.base import BaseParameters
 from axisight.rigid_body.findings import IdentificationFinding
@@ -21,6 +22,7 @@ from axisight.statistics.least_squares import condition
 Array = NDArray[np.float64]
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class RigidBodyEstimate:
     """Base parameters with their uncertainty, and how well they explain the torques.

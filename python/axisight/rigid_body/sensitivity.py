@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
+from axisight.display.summary import summarized
 from axisight.rigid_body.regressor import TorqueModel
 
 Array = NDArray[np.float64]
@@ -23,6 +24,7 @@ _TURNS = ((np.pi / 4.0, 1.0), (np.pi / 2.0, 0.5 * (1.0 - np.sqrt(2.0))))
 with k = 1 (2 sum c sin s = 1) and k = 2 (2 sum c sin 2 s = 2)."""
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
     """Regressor (n, rows, p) and its derivatives with respect to the motion of driven joints.

@@ -14,6 +14,7 @@ import scipy
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.rigid_body.fourier import FourierTrajectory, series
 from axisight.rigid_body.regressor import TorqueModel
@@ -41,6 +42,7 @@ _ADVICE: dict[str, str] = {
 }
 
 
+@summarized
 @dataclass(frozen=True)
 class MotionLimits:
     """What a trajectory must not pass, joint side; one number for all axes or one per axis.
@@ -60,6 +62,7 @@ class MotionLimits:
     torque_nm: ArrayLike | None = None
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class TrajectoryDesign:
     """The best trajectory of all starts.

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight import _core
+from axisight.display.summary import summarized
 
 Array = NDArray[np.float64]
 
 
+@summarized
 @dataclass(frozen=True)
 class Spring:
     """A gearbox or an elastic joint: stiffness [Nm/rad] and damping [Nm s/rad].
@@ -23,6 +25,7 @@ class Spring:
     damping: float
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Link:
     """The body that moves with a joint.
@@ -36,6 +39,7 @@ class Link:
     inertia_kg_m2: Array
 
 
+@summarized
 @dataclass(frozen=True)
 class Drive:
     """Motor and gear of a driven joint.
@@ -49,6 +53,7 @@ class Drive:
     viscous_friction: float
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Joint:
     """A joint of the chain and what it carries.

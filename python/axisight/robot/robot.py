@@ -12,11 +12,12 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
-from axisight.arguments import positive, usable_path
+from axisight.arguments import did_you_mean, instance, positive, usable_path
 from axisight.display import html
 from axisight.documents import read_text
 from axisight.effects import Effect, core_effects, effect_of_core
 from axisight.errors import InputError, RobotError
+from axisight.robot.axis_names import axis_number, effect_on
 from axisight.robot.description import Joint, joint_of
 from axisight.robot.presets import PRESETS
 from axisight.robot.sources import is_model_file, refuse_neither
@@ -71,7 +72,9 @@ class Robot:
             f"{self.name}: {self.n_axes} axes, {self.n_joints} joints, "
             f"sample time {self.sample_time_s:g} s, controller {self.controller_kind}",
             html.table(
-                ("axis", "joint", "kind", "gear", "gear ratio", "operating point [rad or m]"), rows
+                ("axis", "joint", "kind", "gear", "gear ratio", "operating point [rad or m]"),
+                rows,
+                "Axes",
             ),
             html.lines([f"with the effects {', '.join(acting)}"] if acting else []),
         )
@@ -142,12 +145,24 @@ class Robot:
         names = self.joint_names
         return [names[joint] for joint in self.axis_joints]
 
-    def axis_parameter(self, axis: int, quantity: str) -> str | None:
-        """Return the name of a parameter of an axis (from 1): of its joint, or of one that moves with it.
+    def axis_number(self, axis: int | str) -> int:
+        """Return the number of an axis (from 1) that is given by number or by the joint it drives.
+
+        Raises InputError with the joint names and the nearest one.
+        """
+        if type(axis) is int and 1 <= axis <= self.n_axes:
+            return axis
+        return axis_number(axis, self.axis_names)
+
+    def axis_parameter(self, axis: int | str, quantity: str) -> str | None:
+        """Return the name of a parameter of an axis: of its joint, or of one that moves with it.
+
+        ``axis`` is a number from 1 or the name of the joint that the axis drives.
 
         ``quantity`` is that of a joint (``stiffness``) or of a link (``mass``), which may be carried by
         an elastic joint between the axis and the next. None where there is none.
         """
+        axis = self.axis_number(axis)
         places = [*self.axis_joints, self.n_joints]
         moved = self.joint_names[places[axis - 1] : places[axis]]
         known = self.parameters()
@@ -231,9 +246,14 @@ class Robot:
     def with_parameters(self, values: Mapping[str, float]) -> Robot:
         """Return the same robot with some parameters replaced, by name, in SI units.
 
-        Raises InputError for a name that `parameters` does not have.
+        Raises InputError for a name that `parameters` does not have, with the nearest one.
         """
-        return self._with_core(self.core.with_parameters(list(values.items())))
+        try:
+            return self._with_core(self.core.with_parameters(list(values.items())))
+        except InputError as error:
+            known = self.parameters()
+            meant = "".join(did_you_mean(name, known) for name in values if name not in known)
+            raise InputError(f"{error}{meant}") from None
 
     @property
     def velocity_feedforward(self) -> bool:
@@ -293,7 +313,22 @@ class Robot:
         Raises InputError for an effect that the robot cannot have: an axis that is not there, a
         spring in a rigid transmission, parameters outside their bounds.
         """
-        return self._with_core(self.core.with_effects(core_effects(effects)))
+        return self._with_core(self.core.with_effects(core_effects(self.placed(effects))))
+
+    def placed(self, effects: Iterable[Effect]) -> list[Effect]:
+        """Return effects with axis numbers in place of joint names.
+
+        Every method and function that takes effects beside a robot does so itself. Raises InputError for
+        what is no effect, and for a name that no driven joint has; the message has the nearest one.
+        """
+        names: list[str] | None = None
+        out = []
+        for effect in effects:
+            instance("effects", effect, Effect)
+            if effect.joints and names is None:
+                names = self.axis_names
+            out.append(effect_on(effect, names or []))
+        return out
 
     def _rows(self, **arrays: ArrayLike) -> tuple[list[Array], bool]:
         out = []
@@ -360,8 +395,9 @@ class Robot:
     def _joint(self, joint: int | str) -> int:
         if isinstance(joint, str):
             if joint not in self.joint_names:
+                meant = did_you_mean(joint, self.joint_names)
                 raise InputError(
-                    f"joint: expected one of {', '.join(self.joint_names)}, got {joint!r}"
+                    f"joint: expected one of {', '.join(self.joint_names)}, got {joint!r}{meant}"
                 )
             return self.joint_names.index(joint)
         index = joint + self.n_joints if joint < 0 else joint
@@ -379,7 +415,7 @@ class Robot:
         if the elastic joints do not settle.
         """
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
-        out = self.core.equilibrium(core_effects(effects), at)
+        out = self.core.equilibrium(core_effects(self.placed(effects)), at)
         return xr.Dataset(
             {
                 "joint_angle_rad": ("joint", out["joint_angle"], {"units": "rad"}),
@@ -398,7 +434,7 @@ class Robot:
         angles [rad]; derivatives are exact (dual numbers).
         """
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
-        return self.core.linearize(core_effects(effects), at)
+        return self.core.linearize(core_effects(self.placed(effects)), at)
 
     def modes(
         self, joint_angle_rad: Sequence[float] | None = None, effects: Iterable[Effect] = ()
@@ -409,7 +445,7 @@ class Robot:
         (mode) and ``shape`` (mode, state; largest element one).
         """
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
-        values, frequency, damping, shapes = self.core.modes(core_effects(effects), at)
+        values, frequency, damping, shapes = self.core.modes(core_effects(self.placed(effects)), at)
         return xr.Dataset(
             {
                 "eigenvalue_rad_s": ("mode", values[:, 0] + 1j * values[:, 1]),
@@ -432,7 +468,7 @@ class Robot:
         """
         f = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
-        pairs = self.core.zoh_response(f.tolist(), core_effects(effects), at)
+        pairs = self.core.zoh_response(f.tolist(), core_effects(self.placed(effects)), at)
         return xr.DataArray(
             pairs[..., 0::2] + 1j * pairs[..., 1::2],
             dims=("frequency_hz", "output", "input"),
@@ -471,8 +507,9 @@ def load_robot(source: Path | str, *, sample_time_s: float | None = None) -> Rob
         text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         known = ", ".join(PRESETS)
+        meant = did_you_mean(source, PRESETS)
         raise RobotError(
-            f"{path}: expected a robot description or a preset ({known}): {error}"
+            f"{path}: expected a robot description or a preset ({known}): {error}{meant}"
         ) from error
     refuse_neither(text, str(path))
     try:

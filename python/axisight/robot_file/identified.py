@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from axisight.arguments import one_of
+from axisight.display.summary import summarized
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.fitting import Fitted
@@ -20,6 +22,7 @@ from axisight.robot_file.checks import check_agreement, checked_covariance
 Array = NDArray[np.float64]
 
 
+@summarized
 @dataclass(frozen=True)
 class Provenance:
     """Where identified values come from.
@@ -36,6 +39,7 @@ class Provenance:
     notes: str = ""
 
 
+@summarized
 @dataclass(frozen=True)
 class Identified:
     """Identified values with their uncertainty and provenance.
@@ -61,8 +65,7 @@ class Identified:
 
     def value(self, name: str) -> float:
         """Return one value; raises InputError for a name that was not identified."""
-        if name not in self.names:
-            raise InputError(f"name: expected one of {', '.join(self.names)}, got {name!r}")
+        one_of("name", name, self.names)
         return float(self.values[self.names.index(name)])
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from axisight import _core
+from axisight.arguments import one_of
 from axisight.errors import InputError
 
 Method = Literal["dopri5", "rk4", "rkn4", "radau5", "rodas4", "auto"]
@@ -32,6 +33,7 @@ class Integrator:
 
     def __post_init__(self) -> None:
         """Refuse what no simulation would take."""
+        one_of("method", self.method, get_args(Method))
         if self.substeps < 1:
             raise InputError(f"substeps: expected at least 1, got {self.substeps}")
         _core.check_integrator(self)

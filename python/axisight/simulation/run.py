@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib.metadata import version
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
+from axisight.arguments import one_of
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.robot import Robot
@@ -191,6 +192,7 @@ def _simulated(
 
     The input of a single run may lack the dimension of runs, and so the noise given.
     """
+    one_of("model", model, get_args(Model))
     data, reference = drive
     error = given_noise(robot, noise, data.shape, noise_seed, noise_cutoff_hz)
     shape = (len(runs), *data.shape[-2:])
@@ -202,7 +204,7 @@ def _simulated(
         raise InputError(f"threads: expected 0 (all cores) or more, got {threads}")
     return _core.simulate_batch(
         robot.core,
-        core_effects(effects),
+        core_effects(robot.placed(effects)),
         data.reshape(shape),
         reference=reference,
         integrator=integrator,

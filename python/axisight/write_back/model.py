@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from axisight import storage
+from axisight.display.summary import summarized
 from axisight.effects import Effect
 from axisight.effects.stated import OTHER_GAINS
 from axisight.errors import InputError
@@ -42,6 +43,7 @@ _NO_JOINT = "the file has no driven joint of this name"
 _Source = tuple[Path, DriveData | None]
 
 
+@summarized
 @dataclass(frozen=True)
 class Written:
     """A model that was written: labels of the causes and re-fitted gains in it, and of those that it has no place for.

@@ -75,7 +75,9 @@ def differences(stored: list[tuple[str, str, str]], fresh: list[tuple[str, str, 
 
 def pictures(book) -> list[str]:
     """Cells that end with a figure."""
-    return [c.id for c in book.cells for o in c.get("outputs", []) if "image/png" in o.get("data", {})]
+    return [
+        c.id for c in book.cells for o in c.get("outputs", []) if "image/png" in o.get("data", {})
+    ]
 
 
 def test_every_notebook_is_known() -> None:

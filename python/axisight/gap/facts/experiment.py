@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from axisight.display.summary import summarized
 from axisight.effects import Effect
 from axisight.excitation import References, write_references
 from axisight.gap.facts.axis_names import placed
@@ -21,6 +22,7 @@ NAMED = 2.0
 _AS_WELL, _NEVER = 1.5, 90.0
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Plan:
     """A motion, and how often to run it.
@@ -52,6 +54,7 @@ class Plan:
         return f"A multisine on all axes would have to be {self.times_shorter:.2g} times as long."
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class Experiment(ABC):
     """References that answer a question: `SeparatingExperiment` or `ShowingExperiment`."""
@@ -88,6 +91,7 @@ class Experiment(ABC):
         return [samples, text]
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class SeparatingExperiment(Experiment):
     """References that tell two rivals apart.
@@ -119,6 +123,7 @@ class SeparatingExperiment(Experiment):
         )
 
 
+@summarized
 @dataclass(frozen=True, eq=False)
 class ShowingExperiment(Experiment):
     """References that show an amplitude of an effect, if the machine has it.

@@ -14,12 +14,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.display import html
+from axisight.display.summary import summarized
 from axisight.effects import Effect
+from axisight.errors import InputError
 from axisight.gap.facts.axis_names import axis_label, verdict_word
 from axisight.gap.facts.compared_quantity import MOTION_HEAD, Compared, VelocityFrom, motion_words
 from axisight.gap.facts.experiment import Experiment
 from axisight.gap.facts.faults import Finding
 from axisight.gap.facts.trace import Trace
+from axisight.robot.axis_names import axis_number
 from axisight.storage import write_whole
 
 VerdictKind = Literal["none", "explained", "unknown", "undecidable"]
@@ -28,6 +31,7 @@ Hidden = Literal["tolerances", "motion"]
 Array = NDArray[np.float64]
 
 
+@summarized
 @dataclass(frozen=True)
 class Interval:
     """A value with its 95 % interval."""
@@ -37,6 +41,7 @@ class Interval:
     high: float
 
 
+@summarized
 @dataclass(frozen=True)
 class Pooled:
     """Torque error of the whole arm as identification papers give it: sqrt(sum e^2 / sum u^2) [1].
@@ -52,6 +57,7 @@ class Pooled:
     floor: float
 
 
+@summarized
 @dataclass(frozen=True)
 class AxisStages:
     """Errors of the simulator at each stage, by axis (n_axes,); ``before`` to ``floor`` as in `Gap`."""
@@ -62,6 +68,7 @@ class AxisStages:
     floor: Array
 
 
+@summarized
 @dataclass(frozen=True)
 class MotionErrors:
     """Errors of position and velocity on the validation logs where positions are compared, rms over time and logs.
@@ -92,6 +99,7 @@ class MotionErrors:
         return {**told, "velocity_from": self.velocity_from}
 
 
+@summarized
 @dataclass(frozen=True)
 class Gap:
     """Relative torque error on the validation logs, rms over axes and logs [1].
@@ -118,6 +126,7 @@ class Gap:
     motion: MotionErrors | None = None
 
 
+@summarized
 @dataclass(frozen=True)
 class Where:
     """One place where the gap lies. ``share`` of the squared gap above the floor [1]."""
@@ -129,6 +138,7 @@ class Where:
     evidence: str
 
 
+@summarized
 @dataclass(frozen=True)
 class Remainder:
     """What stands above the floor on the validation logs with the causes in.
@@ -145,6 +155,7 @@ class Remainder:
     varies_with: str | None = None
 
 
+@summarized
 @dataclass(frozen=True)
 class Reproduction:
     """How far the model reproduces the user's own simulator along the same references.
@@ -177,6 +188,7 @@ def label(effect: str, axis: int | None, axes: tuple[int, int] | None = None) ->
     return effect if axis is None else f"{effect}@{axis}"
 
 
+@summarized
 @dataclass(frozen=True)
 class Cause:
     """An effect that explains (part of) the gap; ``axis`` is 1-based or None for the arm.
@@ -208,6 +220,7 @@ class Cause:
         return Effect(self.effect, None if self.axes else self.axis, values, self.axes)
 
 
+@summarized
 @dataclass(frozen=True)
 class AxisVerdict:
     """What the estimation logs say of one axis (from 1).
@@ -224,6 +237,7 @@ class AxisVerdict:
     causes: tuple[int, ...]
 
 
+@summarized
 @dataclass(frozen=True)
 class Candidate:
     """One effect on one axis as it was ranked, held out.
@@ -247,6 +261,7 @@ class Candidate:
         return label(self.effect, self.axis, self.axes)
 
 
+@summarized
 @dataclass(frozen=True)
 class DetectionLimit:
     """The smallest amplitude of an effect that the logs would have shown, nineteen times of twenty.
@@ -267,6 +282,7 @@ class DetectionLimit:
     hidden: Hidden | None = None
 
 
+@summarized
 @dataclass(frozen=True)
 class Overlay:
     """Measured and simulated torque on one axis of one held-out log, for plotting.
@@ -282,6 +298,7 @@ class Overlay:
     after_nm: Array
 
 
+@summarized
 @dataclass(frozen=True)
 class Diagnosis:
     """Everything a diagnosis found.
@@ -340,6 +357,18 @@ class Diagnosis:
         """Name of the joint that each axis drives, where the provenance has them."""
         return tuple(self.provenance.get("axis_names", ()))
 
+    def axis(self, axis: int | str) -> AxisVerdict:
+        """Return the verdict of one axis, given by its number from 1 or by the name of its joint.
+
+        Raises InputError for an axis that is not there, with the nearest joint name, and where the
+        diagnosis has no verdicts by axis.
+        """
+        number = axis_number(axis, self.joints or len(self.gap.before_per_axis))
+        for one in self.axes:
+            if one.axis == number:
+                return one
+        raise InputError(f"axis: expected an axis with a verdict of its own, got {number}")
+
     def axis_rows(self) -> list[tuple[int, str, tuple[float, ...]]]:
         """Return of each axis its number (from 1), verdict in words, and gap: before, re-fitted, after, floor [1].
 
@@ -357,6 +386,32 @@ class Diagnosis:
             out.append((i, verdict_word(verdicts.get(i, ""), row), row))
         return out
 
+    def _summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """Return a title and rows for the repr: verdict, gap, causes with values, axes."""
+        gap = self.gap
+        stages = (gap.before, gap.refitted, gap.after, gap.floor)
+        words = ("as given", "re-fitted", "with the causes", "noise alone")
+        rows = [("verdict", self.headline)]
+        rows.append(
+            ("gap", ", ".join(f"{_percent(x)} {w}" for x, w in zip(stages, words, strict=True)))
+        )
+        for cause in self.causes[:_SHOWN]:
+            values = [
+                f"{n} {html.number(p.value)} {cause.units.get(n, '')}".strip()
+                for n, p in cause.parameters.items()
+            ]
+            rows.append(
+                (cause.label, f"{100 * cause.probability:.0f} %: {', '.join(values[:_SHOWN])}")
+            )
+        if len(self.causes) > _SHOWN:
+            rows.append(("causes", f"and {len(self.causes) - _SHOWN} more"))
+        for number, verdict, row in self.axis_rows()[:_SHOWN]:
+            name = f"axis {axis_label(number, self.joints)}"
+            rows.append((name, f"{verdict}: {_percent(row[0])} to {_percent(row[2])}".lstrip(": ")))
+        if self.next_experiment:
+            rows.append(("next", self.next_experiment))
+        return f"Diagnosis {self.name!r}: {self.verdict}", rows
+
     def _repr_html_(self) -> str:
         """Verdict, causes with values, and the gap by axis, for notebooks."""
         causes = [row for cause in self.causes for row in _rows(cause)]
@@ -372,12 +427,20 @@ class Diagnosis:
         return html.page(
             f"{self.name}: {self.verdict}",
             html.lines([self.headline]),
-            html.table(("cause and its values", "value", "95 % interval", "probability"), causes),
-            html.table(("axis", "verdict", "gap before", "re-fitted", "after", "noise"), rows),
+            html.table(
+                ("cause and its values", "value", "95 % interval", "probability"), causes, "Causes"
+            ),
+            html.table(
+                ("axis", "verdict", "gap before", "re-fitted", "after", "noise"),
+                rows,
+                "Gap by axis on the validation logs",
+            ),
             html.table(
                 ("axis", *MOTION_HEAD),
                 ((str(i), *map(html.number, row)) for i, row in enumerate(moved, start=1)),
-                "" if gap.motion is None else motion_words(gap.motion.velocity_from),
+                "Errors of motion"
+                if gap.motion is None
+                else motion_words(gap.motion.velocity_from),
             ),
             html.lines([*(f"finding: {finding}" for finding in self.findings), *then]),
         )
@@ -426,6 +489,10 @@ class Diagnosis:
     def save_verdict(self, path: Path | str) -> None:
         """Write the verdict as JSON; the file appears whole or not at all."""
         write_whole(Path(path), self.to_json())
+
+
+# Causes, values and axes that a repr shows.
+_SHOWN = 7
 
 
 def _rows(cause: Cause) -> list[tuple[str, ...]]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Any
 
+from axisight.display.summary import summarized
 from axisight.robot import Robot
 
 # Standard deviation of a simulator's own parameters, relative [1]. About one
@@ -29,6 +30,7 @@ KNOWN_AS = "viscous_friction"
 """Quantity whose tolerance is that of effects that a simulator states itself, dry friction first."""
 
 
+@summarized
 @dataclass(frozen=True)
 class Settings:
     """Settings of a diagnosis.

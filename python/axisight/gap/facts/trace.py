@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass
 from types import MappingProxyType
 from typing import Any
 
+from axisight.display.summary import summarized
+
 NONE = "none"
 """The hypothesis that nothing is missing on an axis."""
 UNKNOWN = "unknown"
@@ -121,6 +123,7 @@ class Work:
     linearizations: int = 0
 
 
+@summarized
 @dataclass(frozen=True)
 class Trace:
     """Comparisons and moves in the order in which the search made them.

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-from axisight.errors import CaseError, InputError
+from axisight.errors import InputError
 from axisight.gap.controller.speed_loop import as_speed_loop
 from axisight.gap.facts.compared_quantity import Compared
 from axisight.gap.facts.faults import Finding
@@ -24,38 +23,8 @@ from axisight.gap.simulator.start_poses import SAYS as FROM_OWN_POSES
 from axisight.gap.simulator.start_poses import at_their_poses
 from axisight.gap.views.choice import view_of
 from axisight.gap.views.view import View
-from axisight.logs import Case, Log, read_case
+from axisight.logs import Log
 from axisight.robot import Robot
-
-
-def named_inputs(
-    case: Case | Path | str | None,
-    robot: Robot | Path | str | None,
-    estimation: Sequence[Log],
-    validation: Sequence[Log],
-) -> tuple[str, Robot | Path | str, list[Log], list[Log]]:
-    """Return a name, the simulator (or where it is read from), estimation logs and validation logs.
-
-    Raises InputError without a case and a robot, CaseError without logs of either role.
-    """
-    source: Robot | Path | str | None
-    if case is not None:
-        read = case if isinstance(case, Case) else read_case(Path(case), currents=True)
-        name, source = read.name, robot if robot is not None else read.robot_path
-        fit_logs, held_logs = list(read.estimation), list(read.validation)
-    elif robot is not None:
-        name, source = "logs", robot
-        fit_logs, held_logs = list(estimation), list(validation)
-    else:
-        raise InputError(
-            "diagnose: expected a case, or a robot with estimation and validation logs"
-        )
-    if not fit_logs or not held_logs:
-        raise CaseError(
-            f"{name}: expected at least one estimation and one validation log, "
-            f"got {len(fit_logs)} and {len(held_logs)}"
-        )
-    return name, source, fit_logs, held_logs
 
 
 @dataclass(frozen=True)

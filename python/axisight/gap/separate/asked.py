@@ -79,6 +79,7 @@ def asked_of(
     if within is not None and to_show is None and not separate:
         raise InputError(f"within: expected with separate or to_show only, got {within}")
     if to_show is not None:
+        (to_show,) = robot.placed([to_show])
         if not to_show.acts:
             raise InputError(
                 f"to_show: expected {to_show.label} of a size that does something, got "

@@ -1,0 +1,222 @@
+"""What results show of themselves: a few lines in a terminal, a table in a notebook.
+
+Numbers have four digits and their units, arrays their shape and range. Nothing here computes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from axisight.display import html
+
+T = TypeVar("T", bound=type)
+
+# Lines of a result in a terminal; entries of an array that are shown one by one; words of a list.
+_MOST_LINES = 24
+_MOST_NUMBERS = 6
+_MOST_WORDS = 4
+_LONGEST = 100
+# Ends of names, longest first, and the unit that they say.
+_UNITS = (
+    ("kg_m2", "kg m^2"),
+    ("nm_s_rad", "Nm s/rad"),
+    ("nm_rad", "Nm/rad"),
+    ("rad_s2", "rad/s^2"),
+    ("m_s2", "m/s^2"),
+    ("rad_s", "rad/s"),
+    ("nm_a", "Nm/A"),
+    ("m_s", "m/s"),
+    ("nm", "Nm"),
+    ("rad", "rad"),
+    ("hz", "Hz"),
+    ("kg", "kg"),
+    ("db", "dB"),
+    ("percent", "%"),
+    ("s", "s"),
+    ("m", "m"),
+)
+# Words before the unit's end that say what the number is, not in which unit.
+_LONG = re.compile(r"_(?:std|rms|per_axis)$")
+
+
+def summarized(kind: T) -> T:
+    """Give a dataclass a short repr and a table for notebooks, made of its fields.
+
+    Fields with ``repr=False`` are left out. Where the class has parameters (``names`` or ``free``, with ``values``
+    and ``std`` or ``standard_error``), these come first, with standard errors. A class keeps a
+    `_repr_html_` and a ``__str__`` of its own. A method ``_summary`` that returns a title and rows of
+    (name, text) takes the place of the fields in the repr. What fits stands on one line.
+    """
+    kind.__repr__ = _text  # type: ignore[assignment]
+    if "_repr_html_" not in kind.__dict__:
+        kind._repr_html_ = _html  # type: ignore[attr-defined]
+    return kind
+
+
+def _text(self: object) -> str:
+    """Return the fields in one line or in a few."""
+    title, rows = type(self).__name__, None
+    if (own := getattr(self, "_summary", None)) is not None:
+        title, rows = own()
+    elif _parameters(self) is None:
+        line = ", ".join(f"{key}={shortened(value, key)}" for key, value in _fields(self))
+        if len(line) < _LONGEST:
+            return f"{title}({line})"
+    rows = _rows(self) if rows is None else rows
+    more = len(rows) - _MOST_LINES
+    width = max((len(name) for name, _ in rows), default=0)
+    lines = [f"  {name:<{width}}  {value}".rstrip() for name, value in rows[:_MOST_LINES]]
+    lines += [f"  and {more} more"] if more > 0 else []
+    return "\n".join([title, *lines])
+
+
+def _html(self: object) -> str:
+    """Return the fields, and the parameters where there are some, as tables."""
+    name = type(self).__name__
+    parameters = _parameters(self)
+    left_out = set() if parameters is None else {"names", "free", "values", "std", "standard_error"}
+    shown = [(key, shortened(value, key)) for key, value in _fields(self) if key not in left_out]
+    parts = [html.table(("field", "value"), shown, f"What is known of this {name}")]
+    if parameters is not None:
+        parts.append(html.values(*parameters))
+    return html.page(name, *parts)
+
+
+def _rows(thing: object) -> list[tuple[str, str]]:
+    """Return names and texts: parameters with standard errors first, then the other fields."""
+    parameters = _parameters(thing)
+    if parameters is None:
+        return [(key, shortened(value, key)) for key, value in _fields(thing)]
+    names, values, errors = parameters
+    found = [
+        (name, f"{html.number(value)} +- {html.number(error)}")
+        for name, value, error in zip(names, values, errors, strict=True)
+    ]
+    left_out = {"names", "free", "values", "std", "standard_error", "parameters"}
+    rest = [(key, shortened(value, key)) for key, value in _fields(thing) if key not in left_out]
+    most = max(4, _MOST_LINES - len(rest))
+    if len(found) > most:
+        found = [*found[: most - 1], ("...", f"and {len(found) - most + 1} parameters more")]
+    return [*found, *rest]
+
+
+def _fields(thing: object) -> list[tuple[str, Any]]:
+    """Return the fields of a dataclass that are to be shown, but those that are None."""
+    if not is_dataclass(thing):
+        return []
+    shown = [(f.name, getattr(thing, f.name)) for f in fields(thing) if f.repr]
+    return [(key, value) for key, value in shown if value is not None]
+
+
+def _parameters(thing: object) -> tuple[Sequence[str], Sequence[float], Sequence[float]] | None:
+    """Return names, values and standard errors of a result that has them."""
+    names = getattr(thing, "free", getattr(thing, "names", None))
+    values = getattr(thing, "values", None)
+    errors = getattr(thing, "standard_error", getattr(thing, "std", None))
+    if not isinstance(names, Sequence) or isinstance(names, str):
+        return None
+    numbers = [x for x in (values, errors) if isinstance(x, np.ndarray) and x.ndim == 1]
+    if len(numbers) != 2 or any(len(x) != len(names) for x in numbers) or not len(names):
+        return None
+    return [str(name) for name in names], numbers[0].tolist(), numbers[1].tolist()
+
+
+def shortened(value: object, name: str = "") -> str:
+    """Return a value in a few words; the end of its ``name`` says the unit of a number."""
+    text = _worded(value)
+    unit = _unit(name) if _is_numeric(value) else ""
+    return f"{text} {unit}".rstrip()
+
+
+def _unit(name: str) -> str:
+    name = _LONG.sub("", name.lower())
+    for end, unit in _UNITS:
+        if name == end or name.endswith(f"_{end}"):
+            return unit
+    return ""
+
+
+def _is_numeric(value: object) -> bool:
+    if isinstance(value, np.ndarray):
+        return value.dtype.kind in "fc"
+    if isinstance(value, tuple | list):
+        return bool(value) and all(_is_numeric(item) for item in value)
+    return isinstance(value, float | np.floating)
+
+
+def _worded(value: object) -> str:  # noqa: PLR0911 one line a kind
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    if isinstance(value, int | np.integer | float | np.floating | complex | np.complexfloating):
+        return _number(value)
+    if isinstance(value, str):
+        return _cut(value)
+    if isinstance(value, np.ndarray):
+        return _array(value)
+    # Tables of xarray and pandas, which are not loaded for this.
+    if isinstance(sizes := getattr(value, "sizes", None), Mapping):
+        listed = ", ".join(f"{dim}: {size}" for dim, size in sizes.items())
+        return f"{type(value).__name__} ({listed})"
+    if isinstance(shape := getattr(value, "shape", None), tuple) and len(shape) == 2:
+        return f"{type(value).__name__} ({shape[0]} rows, {shape[1]} columns)"
+    if isinstance(value, Mapping):
+        pairs = [f"{key}: {_item(item)}" for key, item in value.items()]
+        return _list(pairs) or "none"
+    if isinstance(value, tuple | list | set | frozenset):
+        return _list([_item(item) for item in value]) or "none"
+    return _item(value)
+
+
+def _item(value: object) -> str:
+    """Return what is said of a value inside another one: of a result its kind, or what it says in words."""
+    if isinstance(value, str | bool | int | float | complex | np.generic | np.ndarray):
+        return _worded(value)
+    if isinstance(value, tuple | list | Mapping):
+        return f"({_worded(value)})" if value else "none"
+    own = type(value).__dict__
+    named = getattr(value, "label", None) or getattr(value, "name", None)
+    if "__str__" in own and "\n" not in (said := str(value)):
+        return _cut(said)
+    kind = type(value).__name__
+    return f"{kind} {_cut(named)}" if isinstance(named, str) and named else kind
+
+
+def _number(value: Any) -> str:
+    if isinstance(value, complex | np.complexfloating):
+        return f"{value:.4g}"
+    return str(int(value)) if isinstance(value, int | np.integer) else html.number(float(value))
+
+
+def _array(value: np.ndarray[Any, Any]) -> str:
+    if value.size == 0:
+        return "none"
+    if value.ndim <= 1 and value.size <= _MOST_NUMBERS:
+        numbers = value.reshape(-1).tolist()
+        return ", ".join(_worded(x) for x in numbers)
+    shape = " x ".join(map(str, value.shape))
+    if value.dtype.kind not in "biufc":
+        return f"{shape} values"
+    size = np.abs(value) if value.dtype.kind == "c" else value
+    finite = size[np.isfinite(size)]
+    if not finite.size:
+        return f"{shape} numbers, none finite"
+    what = "of size " if value.dtype.kind == "c" else ""
+    low, high = (_worded(x.item()) for x in (finite.min(), finite.max()))
+    return f"{shape} numbers, {what}{low} to {high}"
+
+
+def _list(texts: Iterable[str]) -> str:
+    found = list(texts)
+    shown = ", ".join(found[:_MOST_WORDS])
+    more = len(found) - _MOST_WORDS
+    return _cut(shown) + (f", and {more} more" if more > 0 else "")
+
+
+def _cut(text: str) -> str:
+    flat = " ".join(text.split())
+    return flat if len(flat) <= _LONGEST else f"{flat[: _LONGEST - 3]}..."

@@ -1,0 +1,215 @@
+"""What a caller of `axisight.diagnose` hands over, turned into a simulator and logs with roles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from axisight.arguments import shown, usable_path
+from axisight.errors import CaseError, InputError
+from axisight.gap.facts.settings import Settings
+from axisight.logs import AnyMap, Case, Log, read_case, read_log
+from axisight.logs.sources import is_folder_log
+from axisight.logs.tables import is_table, log_of_table
+from axisight.robot import Robot, load_robot
+from axisight.robot.presets import PRESETS
+from axisight.robot.sources import MODEL_SUFFIXES
+
+# How files of robots end; tables (.csv) may be logs.
+_ROBOTS = {*MODEL_SUFFIXES, ".toml"} - {".csv"}
+_HOW = "diagnose(robot, logs, validation=...)"
+_ONE_LOG = (
+    "validation: expected logs to hold out, or at least two logs, got one log; "
+    "log.part(0, 20) and log.part(20) make two of it"
+)
+
+
+@dataclass(frozen=True)
+class Given:
+    """A simulator, or where it is read from, and logs with roles; `says` what was done without being asked."""
+
+    name: str
+    source: Robot | Path | str
+    estimation: list[Log]
+    validation: list[Log]
+    simulated: list[Log]
+    says: tuple[str, ...] = ()
+
+
+def given_inputs(
+    first: object,
+    logs: object,
+    robot: object,
+    estimation: object,
+    validation: object,
+    simulated: object,
+    columns: AnyMap | Path | str | None,
+) -> Given:
+    """Return what was handed over; arguments as those of `diagnose`, of which ``first`` is ``case``.
+
+    Without validation logs the last of several ``logs`` is held out. Raises InputError naming the argument
+    that is missing, of another type, or given twice; CaseError without logs of either role; LogError for
+    logs that cannot be read.
+    """
+    case, source, logs = _sorted_out(first, logs, robot, estimation)
+    if case is not None:
+        source = case.robot_path if source is None else source
+        read = _Reader(source, columns)
+        held = [*case.validation, *read.logs("validation", validation)]
+        sims = read.logs("simulated", simulated)
+        return _with_both(Given(case.name, source, list(case.estimation), held, sims))
+    if source is None:
+        raise InputError(
+            f"diagnose: expected a case, or a robot with estimation and validation logs: {_HOW}"
+        )
+    read = _Reader(source, columns)
+    held, sims = read.logs("validation", validation), read.logs("simulated", simulated)
+    if logs is None:
+        fitted = read.logs("estimation", estimation)
+        return _with_both(Given("logs", source, fitted, held, sims))
+    fitted = read.logs("logs", logs)
+    says: tuple[str, ...] = ()
+    if not held and len(fitted) == 1:
+        raise InputError(_ONE_LOG)
+    if not held and fitted:
+        held = [fitted.pop()]
+        says = (f"No validation logs were given: the last log, {held[0].name!r}, is held out.",)
+    return _with_both(Given("logs", source, fitted, held, sims, says))
+
+
+def check_options(settings: object) -> None:
+    """Raise InputError for settings of another type."""
+    if settings is not None and not isinstance(settings, Settings):
+        raise InputError(f"settings: expected Settings, got {shown(settings)}")
+
+
+def _sorted_out(
+    first: object, logs: object, robot: object, estimation: object
+) -> tuple[Case | None, Robot | Path | str | None, object]:
+    """Return the case, or the simulator and the logs to fit and choose on; None for what is not there."""
+    chosen = None if robot is None else _robot("robot", robot)
+    some = _some(estimation)
+    if logs is not None and some:
+        raise InputError("estimation: expected logs, or estimation, got both")
+    if first is None:
+        return None, chosen, logs
+    if isinstance(first, Robot) or (_is_path(first) and (logs is not None or some)):
+        if chosen is not None:
+            raise InputError("robot: expected one robot, got one first and one by name")
+        if logs is None and not some:
+            _no_logs(first)
+        return None, _robot("robot", first), logs
+    if isinstance(first, Case) or _is_path(first):
+        path = None if isinstance(first, Case) else Path(str(first))
+        if path is None or (path.is_dir() and not is_folder_log(path)):
+            if logs is not None or some:
+                raise InputError("logs: expected none beside a case, which has its own, got some")
+            return first if isinstance(first, Case) else _read(first), chosen, None
+        if chosen is not None:
+            return None, chosen, [path]
+        return _read(_case_path(path)), None, None
+    if isinstance(first, Log) or is_table(first) or isinstance(first, Iterable):
+        if isinstance(logs, Robot) or chosen is None:
+            raise InputError(f"robot: expected the robot first, {_HOW}, got {_kind(first)}")
+        if logs is not None or some:
+            raise InputError("logs: expected logs once, got them twice")
+        return None, chosen, first
+    raise InputError(
+        f"case: expected a case folder, or a robot with logs ({_HOW}), got {shown(first)}"
+    )
+
+
+def _case_path(path: Path) -> Path:
+    """Return the path of a case; raises InputError for a robot without logs and a log without robot."""
+    if str(path) in PRESETS or path.suffix.lower() in _ROBOTS:
+        _no_logs(path)
+    if path.is_file() or is_folder_log(path):
+        raise InputError(f"robot: expected a robot beside the log {path}, {_HOW}, got none")
+    return path
+
+
+def _read(path: object) -> Case:
+    return read_case(usable_path(str(path), CaseError), currents=True)
+
+
+def _no_logs(robot: object) -> None:
+    """Raise InputError for a robot without logs."""
+    name = robot.name if isinstance(robot, Robot) else robot
+    raise InputError(f"logs: expected logs beside the robot {str(name)!r}, {_HOW}, got none")
+
+
+def _is_path(value: object) -> bool:
+    return isinstance(value, str | PathLike)
+
+
+def _some(value: object) -> bool:
+    """Whether logs were given: none is an empty list, or nothing."""
+    return value is not None and not (isinstance(value, tuple | list) and not value)
+
+
+def _kind(value: object) -> str:
+    return "logs" if isinstance(value, Log) or is_table(value) else f"a {type(value).__name__}"
+
+
+def _robot(field: str, value: object) -> Robot | Path | str:
+    if isinstance(value, Robot | str):
+        return value
+    if isinstance(value, PathLike):
+        return Path(value)
+    raise InputError(f"{field}: expected a Robot, a preset or a path, got {shown(value)}")
+
+
+def _with_both(given: Given) -> Given:
+    """Return what was given; raises CaseError without logs of either role."""
+    if not given.estimation or not given.validation:
+        raise CaseError(
+            f"{given.name}: expected at least one estimation and one validation log, "
+            f"got {len(given.estimation)} and {len(given.validation)}"
+        )
+    return given
+
+
+class _Reader:
+    """Reads logs of a robot, whatever they come as; the robot is loaded when the first one needs it."""
+
+    def __init__(self, source: Robot | Path | str, columns: AnyMap | Path | str | None) -> None:
+        self._source = source
+        self._columns = columns
+        self._loaded: Robot | None = source if isinstance(source, Robot) else None
+
+    def logs(self, field: str, given: object) -> list[Log]:
+        """Return logs, given as one or as several; raises InputError naming the field and the place."""
+        if given is None:
+            return []
+        if isinstance(given, Log) or _is_path(given) or is_table(given):
+            return [self._one(field, given, field.rstrip("s"))]
+        if isinstance(given, Case):
+            raise InputError(f"{field}: expected logs, got a Case; diagnose(case) takes it whole")
+        if not isinstance(given, Iterable):
+            raise InputError(f"{field}: expected logs ({_LOGS}), got {shown(given)}")
+        each = list(given)
+        stem = "log" if field in {"logs", "estimation"} else field
+        return [self._one(f"{field}[{k}]", one, f"{stem}{k + 1}") for k, one in enumerate(each)]
+
+    def _one(self, field: str, given: Any, name: str) -> Log:
+        if isinstance(given, Log):
+            return given
+        if _is_path(given):
+            path = usable_path(given, InputError, field)
+            return read_log(path, self._columns, robot=self._robot(), currents=True)
+        if is_table(given):
+            named = getattr(given, "attrs", {}).get("name", name)
+            robot = self._robot()
+            return log_of_table(given, self._columns, name=str(named), robot=robot, currents=True)
+        raise InputError(f"{field}: expected a log ({_LOGS}), got {shown(given)}")
+
+    def _robot(self) -> Robot:
+        if self._loaded is None:
+            self._loaded = load_robot(self._source)  # type: ignore[arg-type]
+        return self._loaded
+
+
+_LOGS = "a path, a Log, a DataFrame or a Dataset"
