@@ -27,13 +27,25 @@ def scale_hex() -> list[str]:
 def cell_colors(share: float, limit: float) -> tuple[str, str]:
     """Background and text colour of a cell whose share [1] lies on a scale from 0 to ``limit``."""
     if math.isnan(share):
-        return MUTED, "#767676"
+        return MUTED, "#595959"
     position = min(1.0, max(0.0, share / limit)) * (len(_STOPS) - 1)
     index = min(int(position), len(_STOPS) - 2)
     mix = position - index
     low, high = _STOPS[index], _STOPS[index + 1]
     color = tuple(round(a + mix * (b - a)) for a, b in zip(low, high, strict=True))
-    return _hex(color), "#ffffff" if _luminance(color) < 0.22 else "#111111"
+    # The one that stands out more: black and white together are above 4.5:1 on every background.
+    ink = max("#000000", "#ffffff", key=lambda ink: contrast(_hex(color), ink))
+    return _hex(color), ink
+
+
+def contrast(one: str, other: str) -> float:
+    """Contrast of two colours ``#rrggbb``, 1 to 21, as WCAG 2 defines it."""
+    low, high = sorted(_luminance(_parts(color)) for color in (one, other))
+    return (high + 0.05) / (low + 0.05)
+
+
+def _parts(color: str) -> tuple[int, ...]:
+    return tuple(bytes.fromhex(color[1:]))
 
 
 def _hex(color: tuple[int, ...]) -> str:

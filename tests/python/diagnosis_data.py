@@ -58,7 +58,10 @@ def overlay(log: str, axis: int, n: int = 6000, error: float = 0.6) -> Overlay:
     speed = np.sin(2 * np.pi * 0.4 * t + axis) + 0.3 * np.sin(2 * np.pi * 1.7 * t)
     base = 2.0 * np.cos(2 * np.pi * 0.4 * t + axis) + 0.8 * axis
     measured = base + error * np.sign(speed) + 0.05 * rng.standard_normal(n)
-    return Overlay(log, axis, t, measured, base, base + 0.97 * error * np.tanh(30 * speed))
+    after = base + 0.97 * error * np.tanh(30 * speed)
+    std = float(measured.std())
+    gaps = [float(np.sqrt(np.mean((x - measured) ** 2))) / std for x in (base, after)]
+    return Overlay(log, axis, t, measured, base, after, np.ones(n), *gaps, std)
 
 
 def gap(before: float, refitted: float, after: float, floor: float, n_axes: int) -> Gap:

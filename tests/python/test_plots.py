@@ -30,7 +30,7 @@ def test_one_prismatic_axis_can_be_drawn(tmp_path):
 
 def test_labels_carry_units():
     top, bottom = axisight.plot_overlay(explained()).axes[:2]
-    assert top.get_ylabel() == "torque [Nm]"
+    assert top.get_ylabel() == "motor torque [Nm]"
     assert bottom.get_xlabel() == "time [s]"
     assert axisight.plot_ranking(explained()).axes[0].get_xlabel() == "probability [%]"
 

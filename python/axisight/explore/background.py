@@ -76,7 +76,7 @@ class Background:
             found = self._run(**self._work, progress=self._progress)
             self.document = found.to_verdict()
         except _StoppedError:
-            self.state, self.says = "stopped", "stopped; nothing was kept"
+            self.state, self.says = "stopped", "nothing was kept"
         except AxisightError as error:
             self.state, self.says = "failed", str(error)
         except Exception as error:
@@ -84,4 +84,4 @@ class Background:
             self.state, self.says = "failed", f"{type(error).__name__}: {error}"
             raise
         else:
-            self.state, self.says = "done", "done"
+            self.state, self.says = "done", ""

@@ -42,13 +42,16 @@ def usual(name: str, place: Place) -> Effect:
     return at_place(name, place, values)
 
 
-def usable(robot: Robot) -> dict[str, list[Place]]:
+def usable(robot: Robot, *, inverse_dynamics: bool = False) -> dict[str, list[Place]]:
     """Return the effects that a robot can have, by name, and their places.
 
-    One is left out where the robot refuses it everywhere, such as a play of a rigid transmission.
+    One is left out where the robot refuses it everywhere, such as a play of a rigid transmission. By
+    ``inverse_dynamics`` so is one that changes no torque computed from the measured motion, such as a delay.
     """
     found = {}
     for name, info in effect_table().items():
+        if inverse_dynamics and not info.inverse_dynamics:
+            continue
         possible = [p for p in places(info, robot.n_axes) if _possible(robot, name, p)]
         if possible:
             found[name] = possible

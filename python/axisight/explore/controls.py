@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -12,11 +12,13 @@ from bokeh.models.formatters import PrintfTickFormatter
 from axisight.effects import Effect, EffectParameter, effect_info, noun, title
 from axisight.errors import AxisightError
 from axisight.explore import words
-from axisight.explore.choices import slider_range, usable, usual
+from axisight.explore.choices import Place, slider_range, usable, usual
 from axisight.explore.state import State
+from axisight.gap.facts.axis_names import own_name
 from axisight.report.wording import place
 
-_WIDTH = 380
+# At most so wide, and never wider than the screen.
+_FITTING = {"sizing_mode": "stretch_width", "max_width": 380}
 # Of the range of a slider.
 _STEPS = 400
 
@@ -26,17 +28,19 @@ class Controls:
 
     def __init__(self, state: State, changed: Callable[[str], None]) -> None:
         self._state, self._changed = state, changed
-        self._none = pn.pane.HTML(words.text("none: the simulator as given", "quiet"))
+        self._names = state.session.robot.axis_names
+        self._none = pn.pane.HTML(words.text("None: the simulator as given.", "quiet"))
         self._none.stylesheets = [words.STYLE]
         # Cards that were made stay and are hidden: a browser that takes elements out while others are
         # drawn can be left with one twice, and loses a press on what is drawn anew.
-        self._cards = pn.Column(self._none, width=_WIDTH)
+        self._cards = pn.Column(self._none, **_FITTING)
         self._made: dict[str, _Card] = {}
-        self._offered = usable(state.session.robot)
+        mode = state.session.view.mode
+        self._offered = usable(state.session.robot, inverse_dynamics=mode == "inverse_dynamics")
         self._name = pn.widgets.Select(
             name="cause", options={title(n): n for n in self._offered}, width=200
         )
-        self._place = pn.widgets.Select(name="where", width=95)
+        self._place = pn.widgets.Select(name="where", width=130)
         self._name.param.watch(lambda _event: self._places(), "value")
         self._add = pn.widgets.Button(
             name="add", width=45, align="end", margin=(5, 0), button_type="primary"
@@ -47,7 +51,7 @@ class Controls:
 
     def view(self) -> Any:
         """Return the cards and what adds one."""
-        return pn.Column(self._cards, pn.Row(self._name, self._place, self._add), width=_WIDTH)
+        return pn.Column(self._cards, pn.FlexBox(self._name, self._place, self._add), **_FITTING)
 
     def add(self, effect: Effect) -> None:
         """Put a cause in."""
@@ -60,10 +64,7 @@ class Controls:
         self._changed("")
 
     def _places(self) -> None:
-        options = {
-            place(None if isinstance(p, tuple) else p, p if isinstance(p, tuple) else None): p
-            for p in self._offered[self._name.value]
-        }
+        options = {_at(p, self._names): p for p in self._offered[self._name.value]}
         kept = self._place.value
         if options != self._place.options:
             self._place.options = options
@@ -96,6 +97,14 @@ class Controls:
         )
 
 
+def _at(where: Place, names: Sequence[str]) -> str:
+    """Return a place in words, with the joint of an axis that has a name of its own."""
+    if isinstance(where, tuple):
+        return place(None, where)
+    name = "" if where is None else own_name(where, names)
+    return f"{place(where)} ({name})" if name else place(where)
+
+
 class _Card:
     """What is shown of a cause: its name, what takes it out, a slider for every parameter."""
 
@@ -114,9 +123,9 @@ class _Card:
         for p, slider in zip(self._parameters, self._sliders, strict=True):
             slider.param.watch(partial(moved, p.name), "value")
         self.view = pn.Column(
-            pn.Row(head, button),
+            pn.FlexBox(head, button),
             *self._sliders,
-            width=_WIDTH,
+            **_FITTING,
             margin=(0, 0, 8, 0),
             styles={"border-left": "3px solid #0072b2", "padding-left": "8px"},
         )
@@ -144,7 +153,8 @@ def _slider(p: EffectParameter, value: float) -> Any:
         fixed_start=p.lower,
         fixed_end=p.upper,
         format=PrintfTickFormatter(format="%.4g"),
-        width=340,
+        sizing_mode="stretch_width",
+        max_width=340,
         margin=(0, 5),
     )
 

@@ -60,18 +60,16 @@ def overlay_figure(diagnosis: Diagnosis, overlay: Overlay, points: int) -> dict[
     unit = torque_unit(diagnosis, overlay.axis)
     # Where the kind of the axis is not known the unit is two, which no number has.
     value_unit = "" if ";" in unit else f" {unit}"
-    before, after = (x - overlay.measured_nm for x in (overlay.before_nm, overlay.after_nm))
+    before, after = overlay.errors_nm
     time = Scale.around(overlay.time_s)
-    curves = {
-        "measured": overlay.measured_nm,
-        "before": overlay.before_nm,
-        "after": overlay.after_nm,
-    }
+    curves = dict(zip(("measured", "before", "after"), overlay.curves_nm, strict=True))
     errors = {"before": before, "after": after}
     word = torque_word(unit)
     return {
         "axis": overlay.axis,
-        "rms": [f"{number(_rms(x), 2)}{value_unit}" for x in (before, after)],
+        "rms": [f"{number(x, 2)}{value_unit}" for x in overlay.rms_nm],
+        "gap": [percent(x) for x in (overlay.gap_before, overlay.gap_after)],
+        "uncounted": bool(np.any(overlay.counted == 0)),
         "names": {
             "measured": "measured",
             "before": "before, simulator as given",
@@ -105,11 +103,6 @@ def _panel(
         "fine": _FINE,
         "lines": lines,
     }
-
-
-def _rms(values: Floats) -> float:
-    finite = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
 
 
 def overlays_by_log(diagnosis: Diagnosis) -> tuple[list[dict[str, Any]], int]:

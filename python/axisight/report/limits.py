@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from axisight.gap.facts.result import DetectionLimit
 from axisight.report.wording import NO_VALUE, number, plain_name
 
-# How places read where no size would show, by what hides it.
+# Words in place of a limit where no size would show, by what hides the effect.
 _HIDDEN = {"tolerances": "hidden", "motion": "never"}
 _MEANING = {
-    "hidden": "the simulator's own parameters, or a plainer law, make up for any size",
-    "never": "no size of it shows in this motion",
+    "hidden": "Hidden: the simulator's own parameters, or a plainer law, make up for any size.",
+    "never": "Never: no size shows in this motion.",
 }
 
 
@@ -29,7 +29,7 @@ class LimitTable:
 
 
 def limit_table(limits: Sequence[DetectionLimit], n_axes: int) -> LimitTable:
-    """Return the limits in words; ``hidden`` or ``never`` where no size that the effect may have would show."""
+    """Return the limits in words: ``hidden`` or ``never`` where no possible size would show."""
     places: list[int | None] = list(range(1, n_axes + 1))
     if any(limit.axis is None for limit in limits):
         places.append(None)
@@ -44,7 +44,7 @@ def limit_table(limits: Sequence[DetectionLimit], n_axes: int) -> LimitTable:
         values = [_value(mine[p]) if p in mine else NO_VALUE for p in places]
         rows.append([title, "" if unit == "1" else unit, *values])
     words = {cell for row in rows for cell in row[2:]}
-    note = "; ".join(f"{word}: {meaning}" for word, meaning in _MEANING.items() if word in words)
+    note = " ".join(meaning for word, meaning in _MEANING.items() if word in words)
     return LimitTable(["arm" if p is None else f"axis {p}" for p in places], rows, note)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -33,6 +32,7 @@ from axisight.report.wording import (
     GapMap,
     after_words,
     cell_percent,
+    filter_words,
     fit_words,
     gap_maps,
     interval_texts,
@@ -51,29 +51,27 @@ from axisight.report.wording import (
 from axisight.storage import write_whole
 
 _VERDICTS: dict[VerdictKind, tuple[str, str]] = {
-    "none": ("No significant gap", "The measured difference is no larger than noise explains."),
-    "explained": ("Explained", "The causes below explain the gap on data they were not fitted to."),
-    "unknown": ("Unknown cause", "There is a gap, but no known effect explains it well enough."),
-    "undecidable": (
-        "Undecidable on this data",
-        "Two or more effects explain the gap equally well on this data.",
-    ),
+    "none": ("None", "The simulator has no gap above the floor."),
+    "explained": ("Explained", "The causes below remove the gap on the validation logs."),
+    "unknown": ("Unknown", "A gap remains that no effect of the library explains."),
+    "undecidable": ("Undecidable", "Two or more causes explain these logs equally well."),
 }
 _WITHIN = (
-    "No unmodelled effect",
-    "There is a gap as given; the simulator's own parameters, re-fitted within their tolerances, remove it: what is "
-    "left is no larger than noise explains.",
+    "None, once re-fitted",
+    "The re-fit of the simulator's own parameters within their tolerances removes the gap. What is left is at the floor.",
 )
+# Names of a diagnosis that say nothing of it.
+_NO_CASE = "logs"
 # Values beside the headline: about its height with a few causes, all friction of a six-axis arm.
 _MOST_VALUES = 12
 _MODES = {
-    "closed_loop": "Closed loop: the simulator ran under the same references and controller.",
-    "inverse_dynamics": "Inverse dynamics: torque predicted from the measured motion.",
+    "closed_loop": "Closed loop: robot and controller are simulated together, from the logged references.",
+    "inverse_dynamics": "Inverse dynamics: the torque is computed from the measured motion.",
 }
 
 _COMPARED = {
     "torques": "measured and simulated motor torque",
-    "positions": "measured and simulated positions, told as the torque that the stated gains command",
+    "positions": "measured and simulated positions, as the torque that the stated gains command",
 }
 
 
@@ -98,8 +96,10 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
     ranking = ranked(diagnosis)
     measured = "measured" if diagnosis.gap.compared == "torques" else ""
     remainder = diagnosis.remainder
+    robot = str(diagnosis.provenance.get("robot") or diagnosis.name)
     return {
-        "name": diagnosis.name,
+        "robot": robot,
+        "case": diagnosis.name if diagnosis.name not in (robot, _NO_CASE) else "",
         "headline": diagnosis.headline,
         "verdict": diagnosis.verdict,
         "badge": badge,
@@ -107,6 +107,9 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
         "mode": _MODES[diagnosis.mode],
         "compared": _COMPARED[diagnosis.gap.compared],
         "torque": f"{measured} {torque_of(diagnosis.gap.compared)}".strip(),
+        "filter": _filter(diagnosis),
+        "drawn": torque_of(diagnosis.gap.compared),
+        "uncounted": any(figure["uncounted"] for log in logs for figure in log["figures"]),
         "numbers": _numbers(diagnosis),
         "gap_rows": _gap_rows(diagnosis),
         "pooled": diagnosis.gap.pooled is not None,
@@ -136,15 +139,21 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
+def _filter(diagnosis: Diagnosis) -> str:
+    """Return which filter both sides of the comparison passed; nothing where no log was kept."""
+    if not diagnosis.overlays:
+        return ""
+    return filter_words(diagnosis.gap.compared, diagnosis.overlays[0].lowpass_hz)
+
+
 def _numbers(diagnosis: Diagnosis) -> list[dict[str, str]]:
     gap = diagnosis.gap
     added = after_words(diagnosis).removeprefix("after, ")
-    after = f"With what was found: {added}."
     rows = (
         ("before", "Gap before", gap.before, "The simulator as given."),
-        ("refitted", "Re-fitted", gap.refitted, "Its own parameters fitted within tolerances."),
-        ("after", "After", gap.after, after),
-        ("floor", "Floor", gap.floor, "What a perfect model would leave: sensor noise."),
+        ("refitted", "Re-fitted", gap.refitted, "Own parameters fitted within their tolerances."),
+        ("after", "After", gap.after, f"{added[:1].upper()}{added[1:]}."),
+        ("floor", "Floor", gap.floor, "A perfect simulator would leave this: sensor noise."),
     )
     largest = max((x for _, _, x, _ in rows if math.isfinite(x)), default=0.0)
     return [
@@ -183,7 +192,7 @@ def _motion(gap: Gap) -> dict[str, Any] | None:
     if gap.motion is None:
         return None
     rows = [[str(i), *map(number, row)] for i, row in enumerate(gap.motion.rows(), 1)]
-    return {"head": MOTION_HEAD, "rows": rows, "words": motion_words(gap.motion.velocity_from)}
+    return {"head": [*MOTION_HEAD], "rows": rows, "words": motion_words(gap.motion.velocity_from)}
 
 
 def _places(places: Sequence[Where]) -> list[dict[str, str]]:
@@ -194,32 +203,30 @@ def _places(places: Sequence[Where]) -> list[dict[str, str]]:
 
 def _remainder(remainder: Remainder, torque: str) -> dict[str, Any]:
     if not remainder.where:
-        text = "Nothing stands out of the floor on the held-out logs with what was found."
+        text = "With the causes in, nothing stands out from the floor on the validation logs."
     else:
         varies = remainder.varies_with
         text = (
-            f"With what was found {percent(remainder.gap)} of the {torque} on the held-out logs "
-            f"remain above the floor{'' if varies is None else f'; that varies with {varies}'}."
+            f"With the causes in, {percent(remainder.gap)} of the {torque} on the validation logs remain above the "
+            f"floor.{'' if varies is None else f' The remainder varies with {varies}.'}"
         )
     return {"text": text, "where": _places(remainder.where)}
 
 
 def _values(causes: Sequence[Cause]) -> dict[str, Any]:
     """Return the values that stand beside the headline: sizes of the causes, and how many are below."""
-    rows: list[dict[str, str]] = []
-    title = ""
+    rows: list[dict[str, Any]] = []
+    title, group = "", 0
     for cause in in_order(causes):
         parameters = _cause(cause)["parameters"]
         shapes = _shapes(cause.effect)
         for row in [r for r in parameters if r["name"] not in shapes] or parameters:
             effect = plain_name(cause.effect)
             unit = "" if row["unit"] == NO_VALUE else row["unit"]
-            shown = {
-                "title": "" if effect == title else effect,
-                "place": place(cause.axis, cause.axes),
-            }
-            rows.append({**row, **shown, "unit": unit})
+            group += effect != title
             title = effect
+            at = place(cause.axis, cause.axes)
+            rows.append({**row, "title": title, "group": group, "place": at, "unit": unit})
     return {"rows": rows[:_MOST_VALUES], "left_out": max(0, len(rows) - _MOST_VALUES)}
 
 
@@ -312,8 +319,19 @@ def _flat(data: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
         name = f"{prefix}{key}"
         if isinstance(value, Mapping):
             rows += _flat(value, f"{name}.")
-        elif isinstance(value, str):
-            rows.append((name, value))
         else:
-            rows.append((name, json.dumps(value, default=str)))
+            rows.append((name, _plain(value)))
     return rows
+
+
+def _plain(value: Any) -> str:
+    """Return a value of a document as people read it."""
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return number(value, 4)
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_plain, value)) or "none"
+    return str(value)

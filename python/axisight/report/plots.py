@@ -10,10 +10,23 @@ from matplotlib.patches import Rectangle
 
 from axisight.arguments import one_of
 from axisight.errors import InputError
+from axisight.gap.facts.axis_names import axis_label
 from axisight.gap.facts.result import Diagnosis, Overlay
 from axisight.logs import Log
 from axisight.palette import AFTER, BEFORE, MEASURED, cell_colors
-from axisight.report.wording import GapMap, gap_maps, ranked, share_limit, title_of
+from axisight.report.wording import (
+    GapMap,
+    after_words,
+    filter_words,
+    gap_maps,
+    number,
+    percent,
+    ranked,
+    share_limit,
+    title_of,
+    torque_unit,
+    torque_word,
+)
 from axisight.robot.axis_names import axis_number
 
 
@@ -64,7 +77,7 @@ def plot_simulation(run: xr.Dataset) -> Figure:
 def plot_gap_map(diagnosis: Diagnosis) -> Figure:
     """Plot the share of the gap by axis, in frequency bands and regimes; returns a Figure.
 
-    Cells that do not stand out from the noise are grey.
+    Grey cells are not significant, or on an axis without a gap.
     """
     maps = gap_maps(diagnosis)
     rows = 1 + (len(maps)) // 2
@@ -117,24 +130,40 @@ def plot_ranking(diagnosis: Diagnosis, count: int = 10) -> Figure:
 def plot_overlay(
     diagnosis: Diagnosis, log: str | None = None, axis: int | str | None = None
 ) -> Figure:
-    """Plot measured torque and the simulator before and after, on a held-out log.
+    """Plot measured torque and the simulator before and after, on a validation log.
 
-    ``log`` and ``axis`` choose what to show. ``axis`` is a number from 1 or a joint name. The default
-    is the first log and the axis of the first cause. Returns a Figure. Raises InputError for a log or
-    an axis that the diagnosis does not have.
+    ``log`` and ``axis`` choose what to show. ``axis`` is a number from 1 or a joint name. The default is the
+    first log and the axis of the first cause. All curves passed the same filter, which the title states. The
+    rms errors in the legend are those of the gap. Returns a Figure. Raises InputError for a log or an axis that
+    the diagnosis does not have.
     """
     item = _chosen(diagnosis, log, axis)
+    unit = torque_unit(diagnosis, item.axis)
+    curves, errors, rms = item.curves_nm, item.errors_nm, item.rms_nm
+    word = torque_word(unit)
+    unit = "Nm or N" if ";" in unit else unit.partition(",")[0]
+    said = [
+        f"rms {number(x, 2)} {unit}, gap {percent(gap)}"
+        for x, gap in zip(rms, (item.gap_before, item.gap_after), strict=True)
+    ]
     figure = Figure(figsize=(10, 4.5), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    top.plot(item.time_s, item.measured_nm, color=MEASURED, lw=0.8, label="measured")
-    top.plot(item.time_s, item.before_nm, color=BEFORE, lw=0.8, label="simulator as given")
-    top.plot(item.time_s, item.after_nm, color=AFTER, lw=0.8, label="causes added")
-    bottom.plot(item.time_s, item.before_nm - item.measured_nm, color=BEFORE, lw=0.8)
-    bottom.plot(item.time_s, item.after_nm - item.measured_nm, color=AFTER, lw=0.8)
-    top.set_ylabel("torque [Nm]")
-    bottom.set(xlabel="time [s]", ylabel="error [Nm]")
-    top.set_title(f"{item.log}, axis {item.axis}")
-    figure.legend(loc="outside upper right", ncols=3, fontsize=8)
+    names = ("measured", "before, simulator as given", after_words(diagnosis))
+    for values, color, name in zip(curves, (MEASURED, BEFORE, AFTER), names, strict=True):
+        top.plot(item.time_s, values, color=color, lw=0.8, label=name)
+    bottom.plot(item.time_s, errors[0], color=BEFORE, lw=0.8, label=f"before, {said[0]}")
+    bottom.plot(item.time_s, errors[1], color=AFTER, lw=0.8, label=f"after, {said[1]}")
+    top.set_ylabel(f"{word} [{unit}]")
+    bottom.set(xlabel="time [s]", ylabel=f"error [{unit}]")
+    axis_name = f"axis {axis_label(item.axis, diagnosis.joints)}"
+    filtered = filter_words(diagnosis.gap.compared, item.lowpass_hz)
+    # Names are other people's: a dollar sign in one would be read as a formula.
+    figure.suptitle(f"{item.log}, {axis_name}\n{filtered}", fontsize=10, parse_math=False)
+    for panel in (top, bottom):
+        # Above the panel: no curve is hidden.
+        panel.legend(
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8, frameon=False
+        )
     return figure
 
 

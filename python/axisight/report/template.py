@@ -12,6 +12,7 @@ import jinja2
 from markupsafe import Markup
 
 from axisight.report.colors import palette_css
+from axisight.report.wording import unbroken
 
 
 def rendered(
@@ -28,6 +29,7 @@ def rendered(
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        finalize=_unbroken,
     )
     style = "\n".join([palette_css(), *map(_source, ("page.css", *styles))])
     code = None if script is None else _source(script)
@@ -37,6 +39,11 @@ def rendered(
         "script": None if code is None else Markup(code),
     }
     return environment.get_template(name).render(page | own).strip() + "\n"
+
+
+def _unbroken(value: Any) -> Any:
+    """Return a text with its numbers joined to their units; what is markup already stays as it is."""
+    return unbroken(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 def _source(name: str) -> str:

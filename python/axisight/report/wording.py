@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.effects import title
+from axisight.gap.facts.compared_quantity import Compared
 from axisight.gap.facts.result import Candidate, Cause, Diagnosis, Interval, Where
 from axisight.gap.facts.wording import LARGEST
 
@@ -33,14 +35,14 @@ _FITS = {
     "loss_converged": "converged",
     "step_converged": "converged",
     "exact": "exact",
-    "max_iterations": "as far as it counts",
-    "stalled": "no step lowers it",
+    "max_iterations": "stopped early",
+    "stalled": "no step lowers the loss",
     "shown_by_the_logs": "shown by the logs",
 }
 
 
 def fit_words(status: str) -> str:
-    """How the fit of a candidate ended: one that is not a cause is fitted as far as its rank needs."""
+    """How the fit of a candidate ended. Candidates that are no cause are fitted only as far as their rank needs."""
     return _FITS.get(status, status)
 
 
@@ -98,6 +100,15 @@ def percent(value: float, digits: int = 2) -> str:
     if exponent < -4:
         return "< 0.0001 %" if scaled > 0 else "> −0.0001 %"
     return _minus(f"{scaled:.{max(0, digits - 1 - exponent)}f} %")
+
+
+# A number and the unit after it.
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|σ|Nm|N|kNm|Hz|ms|s|rad|mrad|rad/s|kg|m|mm|°)(?![\w]))")
+
+
+def unbroken(text: str) -> str:
+    """``13.1 %`` with a space at which no line breaks, wherever a text has a number and its unit."""
+    return _UNIT.sub("\N{NO-BREAK SPACE}", text)
 
 
 def probability(value: float) -> str:
@@ -183,6 +194,18 @@ def torque_word(unit: str) -> str:
     """What a quantity in ``unit``, as `torque_unit` has it, is called."""
     kind = "force" if unit.removesuffix(_FROM_POSITIONS) == "N" else "torque"
     return f"{'commanded' if unit.endswith(_FROM_POSITIONS) else 'motor'} {kind}"
+
+
+def filter_words(compared: Compared, lowpass_hz: float | None) -> str:
+    """Which filter measured and simulated signals passed before they are drawn and subtracted."""
+    if lowpass_hz is None:
+        return "Measured and simulated torque are compared as sampled, without a filter."
+    what = (
+        "Errors of position pass a"
+        if compared == "positions"
+        else "Measured and simulated torque pass the same"
+    )
+    return f"{what} low-pass of {number(lowpass_hz, 2)} Hz."
 
 
 @dataclass(frozen=True)

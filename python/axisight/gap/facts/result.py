@@ -285,9 +285,14 @@ class DetectionLimit:
 @summarized
 @dataclass(frozen=True)
 class Overlay:
-    """Measured and simulated torque on one axis of one held-out log, for plotting.
+    """Measured and simulated torque on one axis of one validation log, as they are compared.
 
-    Arrays have shape (n,); torque in Nm (N on a prismatic axis).
+    Arrays have shape (n,), thinned for plotting; torque in Nm (N on a prismatic axis). Measured and
+    simulated torque passed the same low-pass, of ``lowpass_hz``; None where neither is filtered. Where
+    positions are compared, it is the low-pass of their errors. ``counted`` (n,): weight of each error, of
+    mean square one along the log; zero at ends that do not count.
+    ``gap_before``, ``gap_after``: rms error of the whole log over ``torque_std_nm``, the standard deviation
+    of the measured torque [1]. Their rms over logs is ``before_per_axis`` and ``after_per_axis`` of `Gap`.
     """
 
     log: str
@@ -296,6 +301,32 @@ class Overlay:
     measured_nm: Array
     before_nm: Array
     after_nm: Array
+    counted: Array
+    gap_before: float
+    gap_after: float
+    torque_std_nm: float
+    lowpass_hz: float | None = None
+
+    @property
+    def curves_nm(self) -> tuple[Array, Array, Array]:
+        """Measured torque, and simulated before and after (n,); NaN where an error does not count."""
+        counts = self.counted > 0
+        return (
+            np.where(counts, self.measured_nm, np.nan),
+            np.where(counts, self.before_nm, np.nan),
+            np.where(counts, self.after_nm, np.nan),
+        )
+
+    @property
+    def errors_nm(self) -> tuple[Array, Array]:
+        """Simulated minus measured, before and after (n,); NaN where an error does not count."""
+        measured, before, after = self.curves_nm
+        return before - measured, after - measured
+
+    @property
+    def rms_nm(self) -> tuple[float, float]:
+        """Rms error of the whole log, before and after [Nm, N], as the gap has it."""
+        return self.gap_before * self.torque_std_nm, self.gap_after * self.torque_std_nm
 
 
 @summarized

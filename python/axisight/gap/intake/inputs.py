@@ -162,4 +162,5 @@ def _read(
         if len(logs) < 2 and not runs:
             raise InputError(_NONE_HELD)
         held = [logs.pop()] if len(logs) > 1 else []
-    return Inputs(paths[0].stem, robot, model, tuple(logs), tuple(held))
+    # By the robot, not by its first log.
+    return Inputs(robot.name or Path(model).stem, robot, model, tuple(logs), tuple(held))

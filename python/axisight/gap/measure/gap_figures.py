@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from axisight.gap.facts.compared_quantity import Compared
 from axisight.gap.facts.result import Gap, Interval, Overlay, Pooled
 from axisight.gap.facts.simulator_variant import combine, relative_squares
+from axisight.gap.views.view import View
 from axisight.logs import Log
 
 Array = NDArray[np.float64]
@@ -129,20 +130,39 @@ def gap_reduction(
     return Interval(value, float(min(low, value)), float(max(high, value)))
 
 
-# Points of an overlay; more than a screen can show.
-_OVERLAY_POINTS = 2000
+# Points of an overlay, from which figures keep the least and the largest of each pixel.
+_OVERLAY_POINTS = 10_000
 
 
 def overlays(
-    logs: Sequence[Log], before: Sequence[Array], after: Sequence[Array]
+    view: View,
+    logs: Sequence[Log],
+    simulated: tuple[Sequence[Array], Sequence[Array]],
+    stages: tuple[Stage, Stage],
 ) -> tuple[Overlay, ...]:
-    """Return measured and simulated torque of every log and axis, thinned for plotting."""
+    """Return measured and simulated torque of every log and axis as compared, thinned for plotting.
+
+    ``simulated``: torques of each log (n, n_axes) [Nm] before and after; ``stages``: their errors.
+    """
     out = []
-    for log, b, a in zip(logs, before, after, strict=True):
+    squares = zip(*(s.per_log() for s in stages), strict=True)
+    for log, before, after, (given, left) in zip(logs, *simulated, squares, strict=True):
         step = max(1, log.n_samples // _OVERLAY_POINTS)
-        time = log.time_s[::step]
+        # What the simulated torques are subtracted from, and not the log: one filter for both sides.
+        measured, counted = view.measured(log), view.counted(log)
+        std = np.std(log.torque_nm, axis=0)
         out += [
-            Overlay(log.name, i + 1, time, log.torque_nm[::step, i], b[::step, i], a[::step, i])
+            Overlay(
+                log.name,
+                i + 1,
+                log.time_s[::step],
+                *(x[::step, i] for x in (measured, before, after)),
+                counted[::step, 0],
+                float(np.sqrt(given[i])),
+                float(np.sqrt(left[i])),
+                float(std[i]),
+                view.lowpass_hz,
+            )
             for i in range(log.n_axes)
         ]
     return tuple(out)

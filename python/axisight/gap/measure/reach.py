@@ -96,7 +96,7 @@ def reach_of(
         reached,
         with_chance(view, found, logs, reached, simulators[-1], measure),
         reductions,
-        overlays(logs, before, steps[-1]),
+        overlays(view, logs, (before, steps[-1]), (given, after)),
         tuple(ErrorLog(*each) for each in remaining),
         measure([b - a for a, b in zip(before, steps[-1], strict=True)]),
         simulators[-1],

@@ -150,6 +150,11 @@ class TargetsView(View):
         """Time between samples of the logs [s]."""
         return self.robot.sample_time_s * self.step
 
+    @property
+    def lowpass_hz(self) -> float:
+        """Cutoff of the low-pass that errors of position pass [Hz]."""
+        return _BAND / self.logged_s
+
     def positions(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
         """Return the motor positions of a simulator on each log (n, n_axes) [rad], at the controller's rate."""
         return simulated_positions(self.robot, variant, logs, threads=self.settings.threads)

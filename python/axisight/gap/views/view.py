@@ -58,6 +58,11 @@ class View(ABC):
     not_offered: frozenset[str] = frozenset()
     """Labels of effects that the logs settle by themselves: no candidates."""
 
+    @property
+    def lowpass_hz(self) -> float | None:
+        """Cutoff of the low-pass that both sides of a comparison pass [Hz]; None where neither is filtered."""
+        return self.cutoff_hz
+
     def __post_init__(self) -> None:
         """Tell the fitter what is large on this robot."""
         self.fitter.natural = NaturalSizes(self.robot, self.logs)
