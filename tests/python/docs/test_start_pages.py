@@ -31,7 +31,9 @@ def words(text: str) -> str:
 
 
 def is_near(shown: str, told: str) -> bool:
-    """Whether a number that a page shows is the one that was told."""
+    """Whether a number that a page shows is the one that was told; counts and axes are the same."""
+    if "." not in shown and "e" not in shown:
+        return shown == told
     mantissa, _, exponent = shown.partition("e")
     last_digit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
     wanted, got = float(shown), float(told)
@@ -120,7 +122,7 @@ def test_what_counts_as_said() -> None:
     told = "found: 0.8604 of 12 │ 13.1 %\nfound: 7 of 12 13 %"
     for line in ("found: 0.860 of 12 13.1 %", "of 12", "found: 7 of 12 13 %", "0.86"):
         assert is_said(line, told), line
-    for line in ("found: 0.873 of 12 13.1 %", "found: 0.860 of 14", "lost: 7", "13.2 %"):
+    for line in ("found: 0.873 of 12 13.1 %", "found: 0.860 of 13", "lost: 7", "13.3 %"):
         assert not is_said(line, told), line
 
 
