@@ -108,6 +108,6 @@ def test_commands_exist(page: Path) -> None:
 def test_a_command_that_does_not_exist_is_found() -> None:
     assert len(list(commands(REPOSITORY / "README.md"))) >= 4
     for wrong in (["diagnos", "a"], ["diagnose", "a", "--reprot", "b"], ["identify", "rigid"]):
-        with pytest.raises(Exception, match="rigid|diagnos|reprot"):
+        with pytest.raises(Exception, match=r"rigid|diagnos|reprot"):
             parse(wrong)
     assert axisight.__version__
