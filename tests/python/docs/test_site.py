@@ -28,7 +28,7 @@ def test_every_page_and_module_is_in_the_navigation(repository: Path) -> None:
 def test_questions_of_a_reader_are_one_click_away(repository: Path) -> None:
     index = (repository / "docs" / "index.md").read_text(encoding="utf-8")
     for question, place in (
-        ("How do I diagnose my bag?", "models.md#recordings-of-ros"),
+        ("How do I diagnose my bag?", "recordings.md#recordings-of-ros"),
         ("What does *undecidable* mean?", "undecidable.md"),
         ("Which keys does a robot file have?", "robot_files.md#keys"),
         ("How do I add an effect of my own?", "../CONTRIBUTING.md#adding-an-effect"),
