@@ -59,7 +59,7 @@ def test_moves_say_what_came_and_went_and_what_it_did_to_the_loss():
         Step("finish", (PLAY,), (PLAY,), 9.0, 8.5),
     )
     moves = account(Trace((), steps)).moves
-    assert moves[0].startswith("move 1, add: + piecewise_stiffness@1; loss 1000 to 10. Took in")
+    assert moves[0].startswith("move 1, add: + piecewise_stiffness@1; loss 1000 to 10. Added")
     assert moves[1].startswith(
         "move 2, exchange: + backlash@1, - piecewise_stiffness@1; loss 10 to 9."
     )
@@ -70,7 +70,7 @@ def test_a_cause_that_shares_its_probability_says_with_what():
     halved = Trace((), (), (Adjustment("either", PLAY, math.log(0.5)),))
     told = account(halved)
     assert told.named == ("backlash@1, once named: either -0.7.",)
-    assert told.rules == ("either: Another cause does the same to the logs, and is as likely.",)
+    assert told.rules == ("either: Another cause gives the same logs and is equally likely.",)
 
 
 def test_an_empty_trace_has_an_empty_account():
