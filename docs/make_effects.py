@@ -47,7 +47,8 @@ How to read the tables of parameters:
 
 | column | meaning |
 |---|---|
-| role | an *amplitude* says how large the effect is. With all amplitudes at their neutral value the effect does nothing, whatever its *shape* parameters are |
+| role: amplitude | how large the effect is. With all amplitudes at their neutral value, the effect does nothing |
+| role: shape | the form of the effect; without influence while all amplitudes are neutral |
 | neutral | for an amplitude the value without effect; for a shape parameter the usual value |
 | bounds | values that are accepted |
 | typical | natural scale of a search |

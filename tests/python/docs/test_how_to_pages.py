@@ -97,3 +97,13 @@ def test_monte_carlo(snippets, tmp_path):
     exec(code.replace('out="results"', 'out="again"'), names)
     assert int(names["result"].attrs["runs"]) == 250
     assert names["result"].arithmetic_mean.dims == ("frequency_hz", "output", "input")
+
+
+@pytest.mark.parametrize("page", ["conventions", "effects", "plots"])
+def test_short_examples(page, snippets):
+    names = {}
+    for code in snippets(page, "python"):
+        exec(code, names)
+    assert names["robot"].n_axes == 3
+    if "run" in names:
+        assert names["run"].attrs["status"] == "completed"
