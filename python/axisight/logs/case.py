@@ -128,11 +128,11 @@ def read_case(
         )
     seen: set[Path] = set()
     for number, entry in enumerate(content.log):
-        usable_path(entry.file, CaseError, f"{path}: log.{number}.file")
+        usable_path(entry.file, CaseError, f"{path}: log {number + 1}: file")
         file = (folder / entry.file).resolve()
         if file in seen:
             raise CaseError(
-                f"{path}: log.{number}.file: expected a new file, got {shown(entry.file)} again"
+                f"{path}: log {number + 1}: file: expected a new file, got {shown(entry.file)} again"
             )
         seen.add(file)
     given = load_column_map(columns) if isinstance(columns, str | Path) else columns
@@ -149,7 +149,7 @@ def read_case(
     for number, log in enumerate(logs):
         if log.n_axes != logs[0].n_axes:
             raise CaseError(
-                f"{path}: log.{number}.file: expected {logs[0].n_axes} axes as in the first log, "
+                f"{path}: log {number + 1}: file: expected {logs[0].n_axes} axes as in the first log, "
                 f"got {log.n_axes}"
             )
     check_same_rate(logs)
@@ -161,7 +161,7 @@ def _check_names(path: Path, content: _CaseFile) -> None:
     """Raise CaseError or LogError for what leads out of the folder of a case; see `untrusted`."""
     check_name(content.robot, f"{path}: robot")
     for number, entry in enumerate(content.log):
-        check_name(entry.file, f"{path}: log.{number}.file")
+        check_name(entry.file, f"{path}: log {number + 1}: file")
         check_log_inside(path.parent / entry.file)
 
 
@@ -188,19 +188,19 @@ def _read_entry(
     file = path.parent / entry.file
     if not file.is_file() and not is_folder_log(file):
         raise CaseError(
-            f"{path}: log.{number}.file: expected an existing file, got {shown(entry.file)}"
+            f"{path}: log {number + 1}: file: expected an existing file, got {shown(entry.file)}"
         )
     log = read_log(file, columns, robot=robot, max_bytes=max_bytes, currents=currents)
     if entry.period_s is not None:
         samples = entry.period_s / log.sample_time_s
         if not np.isfinite(samples) or round(samples) < 1 or abs(samples - round(samples)) > 0.01:
             raise CaseError(
-                f"{path}: log.{number}.period_s: expected a whole number of samples, got "
+                f"{path}: log {number + 1}: period_s: expected a whole number of samples, got "
                 f"{samples:.6g}"
             )
         if round(samples) > log.n_samples:
             raise CaseError(
-                f"{path}: log.{number}.period_s: expected at most the log's {log.duration_s:g} s, "
+                f"{path}: log {number + 1}: period_s: expected at most the log's {log.duration_s:g} s, "
                 f"got {entry.period_s:g} s"
             )
     return dataclasses.replace(log, excitation=entry.excitation, period_s=entry.period_s)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from difflib import get_close_matches
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import ErrorDetails
 
 from axisight.arguments import short, shown
 from axisight.logs.units import (
@@ -79,9 +82,9 @@ class _Signal(Address):
     def _counts(self) -> _Signal:
         unit = getattr(self, "unit", "")
         if unit in {"counts", "counts/s"} and self.counts_per_rev is None:
-            raise ValueError(f"counts_per_rev is needed with unit {unit!r}")
+            raise ValueError(f"unit {unit!r}: expected counts_per_rev beside it, got none")
         if self.scale == 0:
-            raise ValueError("scale must not be zero")
+            raise ValueError("scale: expected a number other than 0, got 0")
         return self
 
 
@@ -109,7 +112,7 @@ class TorqueColumn(_Signal):
     @model_validator(mode="after")
     def _scaled(self) -> TorqueColumn:
         if self.unit == "V" and self.scale is None:
-            raise ValueError("scale (Nm or N per V) is needed with unit 'V'")
+            raise ValueError("unit 'V': expected scale (Nm or N per V) beside it, got none")
         return self
 
     @property
@@ -155,7 +158,8 @@ class AxisColumns(_Strict):
             signal = getattr(self, field)
             if signal is not None and signal.unit in wrong:
                 raise ValueError(
-                    f"{field} in {signal.unit} does not go with position in {self.position.unit}"
+                    f"{field}: expected a unit that goes with a position in {self.position.unit}, got "
+                    f"{signal.unit}"
                 )
         return self
 
@@ -190,22 +194,105 @@ class ColumnMap(_Strict):
     @model_validator(mode="after")
     def _rate_known(self) -> ColumnMap:
         if self.time is None and self.sample_rate_hz is None:
-            raise ValueError("give sample_rate_hz, [time], or both")
+            raise ValueError("expected sample_rate_hz, [time], or both, got neither")
         return self
 
 
 def describe_validation(error: ValidationError) -> str:
-    """Return pydantic's findings as "field: message (got value)", joined by semicolons."""
-    parts = []
+    """Return pydantic's findings as "field: expected ..., got ...", joined by semicolons.
+
+    Entries of lists count from 1: "axis 2: torque.unit".
+    """
     items = error.errors()
-    for item in items[:_SHOWN]:
-        path = ".".join(short(str(key)) for key in item["loc"]) or "(whole file)"
-        message = short(item["msg"], 200)
-        if item["type"] == "extra_forbidden":
-            parts.append(f"{path}: expected a known key, got an unknown one")
-        elif item["type"] in {"missing", "value_error"}:
-            parts.append(f"{path}: {message}")
-        else:
-            parts.append(f"{path}: {message}, got {shown(item['input'])}")
+    # A list whose entries are wrong counts as empty too: that is no fault of its own.
+    inner = [item["loc"] for item in items]
+    items = [
+        item
+        for item in items
+        if item["type"] != "too_short"
+        or not any(
+            len(at) > len(item["loc"]) and at[: len(item["loc"])] == item["loc"] for at in inner
+        )
+    ]
+    missing = [item["loc"] for item in items if item["type"] == "missing"]
+    parts = [f"{_place(item['loc'])}: {_fault(item, missing)}" for item in items[:_SHOWN]]
     more = [f"and {len(items) - _SHOWN} more"] if len(items) > _SHOWN else []
     return "; ".join([*parts, *more])
+
+
+def _place(keys: tuple[int | str, ...]) -> str:
+    """Return the place of a key: names with dots between, entries of lists by number."""
+    text = ""
+    for key in keys:
+        if isinstance(key, int):
+            text += f" {key + 1}:"
+        else:
+            text += f"{'' if not text else ' ' if text.endswith(':') else '.'}{short(key)}"
+    return text.removesuffix(":") or "(whole file)"
+
+
+def _fault(item: ErrorDetails, missing: Sequence[tuple[int | str, ...]]) -> str:
+    """Return what is wrong with one key, and what was meant; ``missing``: keys that are not there."""
+    kind, got = item["type"], shown(item["input"])
+    if kind == "missing":
+        return "expected this key, got none"
+    if kind == "extra_forbidden":
+        *parent, key = item["loc"]
+        beside = [str(at[-1]) for at in missing if list(at[:-1]) == parent]
+        near = get_close_matches(str(key), [*beside, *_keys()], n=1, cutoff=0.7)
+        meant = f". Did you mean {near[0]!r}?" if near else ""
+        return f"expected a known key, got an unknown one{meant}"
+    if kind == "literal_error":
+        expected = str(item["ctx"]["expected"]).replace("'", "").replace(" or ", ", ")
+        return f"expected one of {expected}, got {got}{_as_unit(item['input'])}"
+    message = short(item["msg"], 200)
+    if kind == "value_error":
+        return message.removeprefix("Value error, ")
+    for begin, said in _BEGINNINGS.items():
+        if message.startswith(begin):
+            message = said + message.removeprefix(begin)
+    return f"{message}, got {got}"
+
+
+_BEGINNINGS = {
+    "Input should be ": "expected ",
+    "String should ": "expected text to ",
+    "Tuple should ": "expected a list to ",
+    "List should ": "expected a list to ",
+}
+
+# Units that people write: the unit that is known, and the factor that goes into `scale`.
+_OTHER_UNITS = {
+    "kNm": ("Nm", 1e3),
+    "mNm": ("Nm", 1e-3),
+    "Ncm": ("Nm", 1e-2),
+    "N.m": ("Nm", 1.0),
+    "N*m": ("Nm", 1.0),
+    "kN": ("N", 1e3),
+    "mA": ("A", 1e-3),
+    "mV": ("V", 1e-3),
+    "mrad": ("rad", 1e-3),
+    "mrad/s": ("rad/s", 1e-3),
+    "grad": ("deg", 0.9),
+    "degree": ("deg", 1.0),
+    "degrees": ("deg", 1.0),
+    "radian": ("rad", 1.0),
+    "radians": ("rad", 1.0),
+    "cm": ("m", 1e-2),
+    "um": ("m", 1e-6),
+}
+
+
+def _as_unit(given: object) -> str:
+    """Return how a unit that is not known is written; empty for what is none."""
+    if not isinstance(given, str) or given not in _OTHER_UNITS:
+        return ""
+    unit, factor = _OTHER_UNITS[given]
+    scale = "" if factor == 1.0 else f" and scale = {factor:g}"
+    return f". Did you mean unit = {unit!r}{scale}?"
+
+
+def _keys() -> set[str]:
+    """Return the keys of all tables of a column map."""
+    tables = {ColumnMap, AxisColumns, CsvOptions, TimeColumn, PositionColumn, TorqueColumn}
+    return {field.alias or name for table in tables for name, field in table.model_fields.items()}

@@ -32,6 +32,6 @@ def raise_errors(path: Path, findings: Iterable[Finding]) -> None:
     errors = [finding for finding in findings if finding.severity == "error"]
     if not errors:
         return
-    more = f" (and {len(errors) - 1} more, see check_log)" if len(errors) > 1 else ""
+    more = f" (and {len(errors) - 1} more, 'axisight check' lists all)" if len(errors) > 1 else ""
     named = f" [{errors[0].name}]" if errors[0].name else ""
     raise LogError(f"{path}: {errors[0].column}: {errors[0].message}{named}{more}")

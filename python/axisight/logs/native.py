@@ -41,17 +41,17 @@ def native_map(names: Iterable[str], where: str) -> ColumnMap:
         listed = ", ".join(map(short, sorted(present)[:_SHOWN])) or "nothing"
         more = ", ..." if len(present) > _SHOWN else ""
         raise LogError(
-            f"{where}: position_1: expected the native columns time_s, position_1, torque_cmd_1 (or "
-            f"position_ref_1: logs of targets need no torque), ... or a column map, got {listed}{more} "
+            f"{where}: position_1: expected columns time_s, position_1, torque_cmd_1 (or position_ref_1), "
+            f"and so on for each axis, or a column map in --columns, got {listed}{more} "
             f"({len(present)} columns); `axisight columns guess LOG --robot MODEL -o columns.toml` proposes "
-            "a map for --columns"
+            "a map"
         )
     highest = max(numbers)
     if highest > len(numbers):
         missing = next(k for k in range(1, highest) if k not in numbers)
         raise LogError(
-            f"{where}: position_{missing}: expected columns of every axis up to the highest, which "
-            f"{short(numbers[highest])} is of, got none of axis {missing}"
+            f"{where}: position_{missing}: expected columns of axes 1 to {highest} (the highest is "
+            f"{short(numbers[highest])}), got none of axis {missing}"
         )
     stems = {match.group(1) for match in matches}
     # Targets of positions stand in for torques where there are none at all.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -136,9 +137,19 @@ class RefusedInputError(CaseError, LogError):
 
     def __init__(self, findings: tuple[Finding, ...]) -> None:
         self.findings = findings
-        refused = [f for f in findings if f.severity == "refuse"]
-        more = f" (and {len(refused) - 1} more)" if len(refused) > 1 else ""
-        super().__init__(f"{refused[0]}{more}")
+        # A scale that nobody knows is often what another fault does: a position in deg scales torques.
+        faults = sorted(
+            (f for f in findings if f.severity == "refuse"),
+            key=lambda f: f.name.endswith("_scaled"),
+        )
+        counts = Counter(f.name for f in faults[1:])
+        names = ", ".join(name if n == 1 else f"{n} of {name}" for name, n in counts.items())
+        more = (
+            f" (and {len(faults) - 1} more: {names}; 'axisight check LOG --robot MODEL' lists all)"
+            if names
+            else ""
+        )
+        super().__init__(f"{faults[0]}{more}")
 
 
 def flagged(findings: Iterable[Finding], names: Collection[str]) -> list[Finding]:

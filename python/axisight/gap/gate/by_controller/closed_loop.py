@@ -161,8 +161,11 @@ def _scaled(
 
 def _advice(name: str) -> str:
     if name.endswith("_scaled"):
-        return "State the unit and scale in a column map, or the gains in the robot file"
-    return "State the unit in a column map"
+        return (
+            "State unit and scale in a column map (--columns), or correct the gains in the robot file. A "
+            "position in deg that is read as rad scales torques too"
+        )
+    return "State the unit in a column map (--columns)"
 
 
 def _shifted(log: Log, axis: _Axis, shifts: list[Shift | None]) -> list[Finding]:
