@@ -14,9 +14,11 @@ from axisight.cli.common import Columns, Force, errors, say
 from axisight.cli.identify_common import (
     Out,
     Unchecked,
+    as_options,
     band,
     check_out,
     load_source,
+    option_words,
     options,
     provenance,
     read_logs,
@@ -148,7 +150,7 @@ def axis_command(
     writes the robot with gear stiffness and damping, motor inertia and friction of the
     axis. The exit status is 1 if the fit did not converge.
     """
-    with errors():
+    with errors(), as_options(ctx):
         check_out(out, [slow, *broadband], columns, force=force)
         machine = None if robot is None else load_source(robot)
         if out is not None and machine is None:
@@ -183,7 +185,7 @@ def axis_command(
             notch_band_hz=band("--notch-band-hz", notch_band_hz),
             plateau_from_hz=plateau_from_hz,
         )
-        say(found.report())
+        say(option_words(found.report(), ctx.params))
         if machine is not None:
             against = axisight.graybox.compare_with_robot(found.fit, machine, number)
             for text in against.findings:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,7 +13,7 @@ import typer
 
 from axisight.cli.common import numbers, say
 from axisight.cli.panels import ADVANCED
-from axisight.errors import InputError, OutputError
+from axisight.errors import AxisightError, InputError, OutputError
 from axisight.gap import RefusedInputError, check_fit_inputs
 from axisight.gap.facts.faults import refused
 from axisight.gap.prepare.used_part import WHOLE, Used
@@ -136,6 +138,39 @@ def options(ctx: typer.Context) -> dict[str, Any]:
         elif name not in ("robot", "out", "force"):
             out[name] = value.name if isinstance(value, Path) else value
     return out
+
+
+@contextmanager
+def as_options(ctx: typer.Context) -> Iterator[None]:
+    """Say errors of the library in the words of the shell: options instead of keyword arguments."""
+    try:
+        yield
+    except AxisightError as error:
+        raise InputError(option_words(str(error), ctx.params)) from None
+
+
+# Keyword arguments whose option has another name.
+_OPTIONS = {'deficient="group"': "--group", "`known`": "--known"}
+
+
+def option_words(text: str, options: Collection[str]) -> str:
+    """Return a message with ``cutoff_hz`` as ``--cutoff-hz``, and ``method="wls"`` as ``--method wls``.
+
+    ``options``: names of the parameters of the command.
+    """
+
+    def given(found: re.Match[str]) -> str:
+        name, value = found["name"], found["value"]
+        return f"--{name.replace('_', '-')} {value}" if name in options else found[0]
+
+    def field(found: re.Match[str]) -> str:
+        name = found[1]
+        return f"--{name.replace('_', '-')}: " if name in options else found[0]
+
+    for keyword, option in _OPTIONS.items():
+        text = text.replace(keyword, option)
+    text = re.sub(r"\b(?P<name>[a-z]\w*)=(?P<quote>['\"])(?P<value>\w+)(?P=quote)", given, text)
+    return re.sub(r"^([a-z]\w*): ", field, text)
 
 
 def provenance(

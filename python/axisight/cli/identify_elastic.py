@@ -17,6 +17,7 @@ import axisight
 from axisight.cli.common import Force, errors, numbers, say
 from axisight.cli.identify_common import (
     Out,
+    as_options,
     check_out,
     load_source,
     options,
@@ -110,7 +111,7 @@ def elastic_command(
     Prints values with standard errors and 95 % intervals, and warnings. The exit status is 1 if the
     search did not converge.
     """
-    with errors():
+    with errors(), as_options(ctx):
         check_out(out, responses, force=force)
         machine = load_source(robot)
         linear = [

@@ -16,6 +16,7 @@ from axisight.cli.common import Columns, Force, From, Moving, To, errors, say
 from axisight.cli.identify_common import (
     Out,
     Unchecked,
+    as_options,
     check_out,
     load_source,
     options,
@@ -161,7 +162,7 @@ def rigid_body_command(
     robot file. It most often needs --consistent: a plain fit may have bodies that cannot exist.
     The exit status is 1 if such bodies were not found to full accuracy.
     """
-    with errors():
+    with errors(), as_options(ctx):
         check_out(out, [*logs, *(held_out or [])], columns, force=force)
         machine = load_source(robot)
         paths = [*logs, *(held_out or [])]

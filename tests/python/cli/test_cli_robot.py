@@ -233,7 +233,7 @@ def test_diagnose_takes_effects_of_the_command_line(axis: Path, log: Path, monke
     assert labels["coulomb_friction@1"].parameters["coulomb_nm"] == 0.2
     assert labels["payload"].parameters["mass_kg"] == 2.0
     refused = run("diagnose", log, log, "--model", axis, "--effect", "backlash@7", code=2)
-    assert "--effect" in refused and "expected an axis from 1 to 1, got axis 7" in refused
+    assert "--effect" in refused and "axis: expected 1 or a joint name (axis1), got '7'" in refused
 
 
 def test_a_given_effect_is_no_longer_missing(axis: Path) -> None:

@@ -18,7 +18,7 @@ def shown(monkeypatch):
         console = Console(width=width, record=True, file=StringIO())
         monkeypatch.setattr(show, "OUT", console)
         monkeypatch.setattr(common, "OUT", console)
-        show.show_diagnosis(diagnosis)
+        show.show_diagnosis(diagnosis, verbose=True)
         return " ".join(console.export_text().split())
 
     return render
@@ -37,7 +37,7 @@ def test_a_diagnosis_says_it_all(shown):
         "remains above noise: 3.7 % of the torque; it varies with speed",
         "remains: axis 1, 70 % of the squared gap above the floor",
         "finding: parameter_at_edge: axis2.damping: ended +32 % off, at the bound",
-        "next experiment: Move slowly.",
+        "next: Move slowly.",
         "stiffness_2 │ -2.1 % │ -3.5 to -0.7 %",
     ):
         assert words in text, words
@@ -66,7 +66,7 @@ def test_positions_are_told_as_what_the_gains_command(shown):
 
 def test_what_is_not_there_is_not_said(shown):
     text = shown(replace(of("none"), gap=replace(of("none").gap, pooled=None)))
-    for words in ("pooled", "remains", "finding", "next experiment", "re-fitted within", "cause"):
+    for words in ("pooled", "remains", "finding", "next: Move", "re-fitted within", "cause and"):
         assert words not in text, words
 
 

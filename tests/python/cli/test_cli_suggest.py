@@ -7,10 +7,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from axisight.arguments import axis_number
 from axisight.cli import app
+from axisight.cli.identify_common import option_words
 from axisight.cli.suggest import suggestion
-from axisight.errors import InputError
+from axisight.errors import InputError, LogError
 from axisight.fitting import robot_parameter
+from axisight.logs.map_files import parse_column_map
 from axisight.robot import load_robot
 
 MAP = """
@@ -41,18 +44,18 @@ WRONG = {
     "identify rigid": "Did you mean 'rigid-body'?",
     "diagnose --repor x": "--report)",
     "--versio": "--version)",
-    "diagnose mycas": "did you mean mycase?",
-    "diagnose run1.csv --model irb6600_lik": "did you mean irb6600_like?",
-    "diagnose run1.csv --model robt.toml": "did you mean robot.toml?",
-    "diagnose run1.csv --effect backlas@1": "did you mean backlash?",
-    "columns show ur-rtd": "did you mean ur-rtde?",
-    "check run2.csv": "did you mean run1.csv?",
-    "check run1.csv --columns map.toml": "did you mean position_1?",
-    "check run1.csv --columns ur-rted": "did you mean ur-rtde?",
-    "check run1.csv --columns mop.toml": "did you mean map.toml?",
-    "excite --robot irb6600_like --kind multisin": "did you mean multisine?",
-    "robot import arn.urdf": "did you mean arm.urdf?",
-    "montecarlo studdy.toml --out x": "did you mean study.toml?",
+    "diagnose mycas": "Did you mean mycase?",
+    "diagnose run1.csv --model irb6600_lik": "Did you mean irb6600_like?",
+    "diagnose run1.csv --model robt.toml": "Did you mean robot.toml?",
+    "diagnose run1.csv --effect backlas@1": "Did you mean 'backlash'?",
+    "columns show ur-rtd": "Did you mean ur-rtde?",
+    "check run2.csv": "Did you mean run1.csv?",
+    "check run1.csv --columns map.toml": "Did you mean position_1?",
+    "check run1.csv --columns ur-rted": "Did you mean ur-rtde?",
+    "check run1.csv --columns mop.toml": "Did you mean map.toml?",
+    "excite --robot irb6600_like --kind multisin": "Did you mean multisine?",
+    "robot import arn.urdf": "Did you mean arm.urdf?",
+    "montecarlo studdy.toml --out x": "Did you mean study.toml?",
 }
 
 
@@ -98,6 +101,61 @@ def test_nothing_is_said_where_nothing_is_near(folder):
 )
 def test_names_are_taken_from_what_errors_list(message, near):
     assert suggestion(message) == near
+
+
+@pytest.mark.parametrize(
+    ("given", "number"), [("2", 2), (3, 3), ("elbow", 3), ("1", 2), ("base", 1)]
+)
+def test_axes_are_numbers_or_joints(given, number):
+    joints = ["base", "1", "elbow"] if given == "1" else ["base", "shoulder_lift_joint", "elbow"]
+    assert axis_number(given, joints) == number
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [
+        ("axis2", ". Did you mean 2?"),
+        ("shoulder_lift", ". Did you mean 'shoulder_lift_joint'?"),
+        ("Elbow", ". Did you mean 'elbow'?"),
+        ("0", ""),
+        (4, ""),
+        (1.5, ""),
+        (None, ""),
+    ],
+)
+def test_what_is_no_axis_is_refused(given, meant):
+    with pytest.raises(InputError) as refused:
+        axis_number(given, ["base", "shoulder_lift_joint", "elbow"], "--axis")
+    expected = "--axis: expected 1 to 3 or a joint name (base, shoulder_lift_joint, elbow), got "
+    assert str(refused.value) == f"{expected}{given!r}{meant}"
+
+
+def test_errors_of_identification_name_options():
+    text = (
+        'cutoff_hz: expected 1; or fix some with `known`, or use deficient="group" or method="wls"'
+    )
+    words = option_words(text, {"cutoff_hz": 1.0, "method": "ls", "known": None})
+    assert (
+        words == "--cutoff-hz: expected 1; or fix some with --known, or use --group or --method wls"
+    )
+    assert option_words('x: use method="wls"', {}) == 'x: use method="wls"'
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (
+            "kNm",
+            "expected one of Nm, N, A, V, got 'kNm'. Did you mean unit = 'Nm' and scale = 1000?",
+        ),
+        ("degrees", "expected one of Nm, N, A, V, got 'degrees'. Did you mean unit = 'deg'?"),
+        ("Nmm", "expected one of Nm, N, A, V, got 'Nmm'"),
+    ],
+)
+def test_units_that_people_write_are_understood(given, said):
+    with pytest.raises(LogError) as refused:
+        parse_column_map(MAP.replace('"Nm"', f'"{given}"'), "map.toml")
+    assert str(refused.value) == f"map.toml: axis 1: torque.unit: {said}"
 
 
 def test_errors_of_the_core_are_understood():

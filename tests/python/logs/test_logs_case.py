@@ -61,16 +61,16 @@ def test_case_with_foreign_logs(folder):
         ("nonsense", ["expected TOML"]),
         (HEAD.replace("case/1", "case/9") + FIRST, ["schema", "axisight.case/1", "case/9"]),
         (HEAD + 'colour = "red"\n' + FIRST, ["colour: expected a known key"]),
-        (HEAD + FIRST + "perod_s = 1\n", ["log.0.perod_s: expected a known key"]),
-        (HEAD + FIRST.replace("estimation", "training"), ["log.0.role", "'training'"]),
+        (HEAD + FIRST + "perod_s = 1\n", ["log 1: perod_s: expected a known key"]),
+        (HEAD + FIRST.replace("estimation", "training"), ["log 1: role", "'training'"]),
         (HEAD + SECOND, ["log", "'estimation'", "1 logs"]),
         (HEAD, ["log", "'estimation'", "0 logs"]),
         (HEAD.replace("robot.toml", "r.toml") + FIRST, ["robot: expected an existing", "r.toml"]),
-        (HEAD + FIRST.replace("a.par", "z.par"), ["log.0.file", "logs/z.parquet"]),
-        (HEAD + FIRST + SECOND.replace("b.par", "a.par"), ["log.1.file", "a.parquet", "again"]),
-        (HEAD + FIRST + "period_s = 0.0011\n", ["log.0.period_s", "whole number"]),
-        (HEAD + FIRST + "period_s = 5.0\n", ["log.0.period_s", "at most", "2 s", "5 s"]),
-        (HEAD + FIRST + "period_s = -1\n", ["log.0.period_s", "greater than 0"]),
+        (HEAD + FIRST.replace("a.par", "z.par"), ["log 1: file", "logs/z.parquet"]),
+        (HEAD + FIRST + SECOND.replace("b.par", "a.par"), ["log 2: file", "a.parquet", "again"]),
+        (HEAD + FIRST + "period_s = 0.0011\n", ["log 1: period_s", "whole number"]),
+        (HEAD + FIRST + "period_s = 5.0\n", ["log 1: period_s", "at most", "2 s", "5 s"]),
+        (HEAD + FIRST + "period_s = -1\n", ["log 1: period_s", "greater than 0"]),
         (FIRST, ["name", "required"]),
     ],
 )
@@ -85,7 +85,7 @@ def test_missing_case_file(tmp_path):
 
 def test_logs_that_do_not_go_together(folder):
     write(folder / "logs/b.parquet", native_columns(n_axes=3))
-    refuse(folder, HEAD + FIRST + SECOND, "log.1.file", "expected 2 axes", "got 3")
+    refuse(folder, HEAD + FIRST + SECOND, "log 2: file", "expected 2 axes", "got 3")
     write(folder / "logs/b.parquet", native_columns(rate_hz=250.0))
     refuse(folder, HEAD + FIRST + SECOND, "b.parquet", "sample rate", error=LogError)
 

@@ -74,7 +74,10 @@ def test_a_gripper_is_one_axis_too_many_until_the_map_says_so(tmp_path):
     ("spoil", "words"),
     [
         (lambda f: (f / "meta/info.json").write_text("{"), "info.json"),
-        (lambda f: (f / "meta/info.json").write_text("{}"), "total_episodes: Field required"),
+        (
+            lambda f: (f / "meta/info.json").write_text("{}"),
+            "total_episodes: expected this key, got none",
+        ),
         (lambda f: (f / "meta/info.json").write_text('{"total_episodes": 0}'), "at least one"),
         (lambda f: shutil.rmtree(f / "data"), "expected rows with episode_index 0"),
         (lambda f: _cut(next(f.rglob("*.parquet"))), "truncated"),

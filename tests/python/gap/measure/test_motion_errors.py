@@ -136,7 +136,7 @@ def test_screen_report_and_verdict_tell_them(capsys: pytest.CaptureFixture) -> N
     found = explained()
     told = MotionErrors(position, velocity, "logged")
     found = replace(found, gap=replace(found.gap, motion=told))
-    show_diagnosis(found)
+    show_diagnosis(found, verbose=True)
     page, notebook = render_report(found), found._repr_html_()
     for text in (capsys.readouterr().out, page, notebook):
         assert "velocities as they were logged" in " ".join(text.split())
