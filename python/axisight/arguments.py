@@ -32,6 +32,11 @@ def short(text: str, most: int = 80) -> str:
     return text if len(text) <= most else text[: most - 3] + "..."
 
 
+def counted(number: int, one: str, many: str = "") -> str:
+    """Return a number with its noun: "1 round", "2 rounds", "3 axes" with ``many`` "axes"."""
+    return f"{number} {one if number == 1 else many or one + 's'}"
+
+
 def shown(value: object) -> str:
     """Return a value for a message, cut where it is long."""
     if isinstance(value, np.ndarray) and value.ndim:

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
+from axisight.arguments import counted
 from axisight.blind import judged_cases, markdown, summary
 from axisight.blind.page import render_score
 from axisight.cli.common import Force, bars, complain, errors, say, write_each, write_text
@@ -63,7 +64,7 @@ def make_command(
         numbers = range(first, first + count)
         choice = Choice(engine, arm, motions)
         make_cases(cases, truth, numbers, seed, workers or os.cpu_count() or 1, progress, choice)
-    say(f"{count} cases: {cases}; what is withheld: {truth}")
+    say(f"{counted(count, 'case')}: {cases}; what is withheld: {truth}")
 
 
 @blind_app.command("run")

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from axisight.arguments import counted
 from axisight.cli.common import complain, errors, numbers, one_or_each, say
 from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.panels import LIMITS, SIGNAL
@@ -180,12 +181,12 @@ def _show(made: Excited) -> None:
     OUT.print(
         f"crest factor {signal.crest_factor:.4f}, peak {signal.peak:.4g} rad/s, "
         f"{len(signal.lines)} lines, period {signal.period_s:g} s, "
-        f"{made.references.n_experiments} experiments"
+        f"{counted(made.references.n_experiments, 'experiment')}"
     )
     if made.search is not None:
         found = made.search
         OUT.print(
-            f"best of {len(found.crest_factors)} starts: number {found.start}, seed {found.seed} "
+            f"best of {counted(len(found.crest_factors), 'start')}: number {found.start}, seed {found.seed} "
             f"({found.status})"
         )
     if made.report is not None:

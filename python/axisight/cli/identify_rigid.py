@@ -38,6 +38,10 @@ if TYPE_CHECKING:
     from axisight.robot_file import Provenance
 
 _FRICTION = ("viscous", "coulomb", "offset")
+_OFFSET = (
+    "torque_offset: the fit above is the torque that an axis needs; the effect in the robot file adds to "
+    "the command, so that it has the other sign"
+)
 _PARAMETERS = {"estimate": "least squares", "consistent": "bodies that can exist"}
 
 
@@ -208,7 +212,10 @@ def _write(
         )
         return
     try:
-        write_robot(machine, out, found.identified(source), force=force)
+        values = found.identified(source)
+        write_robot(machine, out, values, force=force)
+        if any(effect.name == "torque_offset" for effect in values.effects):
+            say(_OFFSET)
     except RobotError as error:
         if found.consistent is not None:
             raise

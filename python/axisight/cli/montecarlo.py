@@ -15,6 +15,7 @@ from rich.progress import Progress as Bars
 from rich.table import Table
 
 from axisight import montecarlo
+from axisight.arguments import counted
 from axisight.cli.common import errors, say
 from axisight.cli.robot import GivenEffects, effects_on, parse_effects, say_effects
 from axisight.cli.screen import BARS, OUT
@@ -79,15 +80,15 @@ def montecarlo_command(
                 progress=progress,
             )
         failed = montecarlo.failures(result)
-        counted = int(result["count"].max())
+        done = int(result["count"].max())
         if len(failed):
             table = Table("run", "seed", "experiment", "kind", "detail", title="failed runs")
             for row in failed.head(10).itertuples(index=False):
                 table.add_row(*(escape(str(cell)) for cell in row))
             OUT.print(table)
         runs_failed = failed["run"].nunique()
-        say(f"{counted} runs counted, {runs_failed} with failures: {out}")
-        if counted == 0:
+        say(f"{counted(done, 'run')} counted, {runs_failed} with failures: {out}")
+        if done == 0:
             raise typer.Exit(1)
 
 

@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from axisight.arguments import counted
 from axisight.cli.common import errors, say
 from axisight.cli.screen import BARS, OUT
 from axisight.errors import InputError
@@ -67,7 +68,7 @@ def reproduce_command(
             setting = context(seed=seed, threads=threads or 0, quick=quick, report=report)
             items = run(name, setting, out, progress)
         _show([claim for item in items for claim in item.claims])
-        say(f"{len(items)} items: {out}")
+        say(f"{counted(len(items), 'item')}: {out}")
 
 
 def _show(claims: list[Claim]) -> None:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from axisight.arguments import counted
 from axisight.cli.common import Force, errors, say
 from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.robot import say_import
@@ -53,5 +54,5 @@ def import_command(
             typer.echo(robot.toml, nl=False)
             return
         write_whole(out, robot.toml)
-        say(f"{out}: {robot.n_axes} axes, {', '.join(robot.axis_names)}")
+        say(f"{out}: {counted(robot.n_axes, 'axis', 'axes')}, {', '.join(robot.axis_names)}")
         say_import(robot)

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from axisight.arguments import shown, usable_path
+from axisight.arguments import counted, shown, usable_path
 from axisight.display import html
 from axisight.display.summary import summarized
 from axisight.documents import parse_toml, read_text
@@ -123,8 +123,8 @@ def read_case(
         raise CaseError(f"{path}: robot: expected an existing file, got {shown(content.robot)}")
     if not any(entry.role == "estimation" for entry in content.log):
         raise CaseError(
-            f"{path}: log: expected at least one with role 'estimation', got "
-            f"{len(content.log)} logs without it"
+            f"{path}: log: expected at least one with role 'estimation', got none among "
+            f"{counted(len(content.log), 'log')}"
         )
     seen: set[Path] = set()
     for number, entry in enumerate(content.log):

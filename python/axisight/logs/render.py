@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from axisight.arguments import counted
 from axisight.logs.checking import LogReport
 
 _STYLES = {"error": "bold red", "warning": "yellow", "ok": "green"}
@@ -19,7 +20,7 @@ def render(report: LogReport) -> RenderableType:
     """Return a rich renderable of the report, errors first; print it with a rich Console."""
     rate = "unknown rate" if report.sample_rate_hz is None else f"{report.sample_rate_hz:.6g} Hz"
     shape = "" if report.n_samples is None else f", {report.n_samples} samples"
-    axes = "" if report.n_axes is None else f", {report.n_axes} axes"
+    axes = "" if report.n_axes is None else f", {counted(report.n_axes, 'axis', 'axes')}"
     table = Table(title=escape(f"{report.path.name}: {rate}{shape}{axes}"), title_justify="left")
     for column in ("severity", "column", "finding"):
         table.add_column(column, overflow="fold")
@@ -34,7 +35,9 @@ def render(report: LogReport) -> RenderableType:
         for severity in ("error", "warning")
     }
     verdict = "readable" if report.ok else "not readable as it is"
-    summary = f"{verdict}: {counts['error']} errors, {counts['warning']} warnings"
+    summary = (
+        f"{verdict}: {counted(counts['error'], 'error')}, {counted(counts['warning'], 'warning')}"
+    )
     return Group(table, Text(summary, style=_STYLES["ok" if report.ok else "error"]))
 
 

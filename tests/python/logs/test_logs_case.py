@@ -63,15 +63,15 @@ def test_case_with_foreign_logs(folder):
         (HEAD + 'colour = "red"\n' + FIRST, ["colour: expected a known key"]),
         (HEAD + FIRST + "perod_s = 1\n", ["log 1: perod_s: expected a known key"]),
         (HEAD + FIRST.replace("estimation", "training"), ["log 1: role", "'training'"]),
-        (HEAD + SECOND, ["log", "'estimation'", "1 logs"]),
-        (HEAD, ["log", "'estimation'", "0 logs"]),
+        (HEAD + SECOND, ["log", "'estimation'", "none among 1 log"]),
+        (HEAD, ["log", "'estimation'", "none among 0 logs"]),
         (HEAD.replace("robot.toml", "r.toml") + FIRST, ["robot: expected an existing", "r.toml"]),
         (HEAD + FIRST.replace("a.par", "z.par"), ["log 1: file", "logs/z.parquet"]),
         (HEAD + FIRST + SECOND.replace("b.par", "a.par"), ["log 2: file", "a.parquet", "again"]),
         (HEAD + FIRST + "period_s = 0.0011\n", ["log 1: period_s", "whole number"]),
         (HEAD + FIRST + "period_s = 5.0\n", ["log 1: period_s", "at most", "2 s", "5 s"]),
         (HEAD + FIRST + "period_s = -1\n", ["log 1: period_s", "greater than 0"]),
-        (FIRST, ["name", "required"]),
+        (FIRST, ["name: expected this key, got none"]),
     ],
 )
 def test_bad_cases(folder, text, words):

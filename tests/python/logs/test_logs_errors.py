@@ -87,7 +87,7 @@ def test_other_columns_are_listed_with_both_kinds_of_native_ones(tmp_path):
     with pytest.raises(LogError) as caught:
         read_log(write(tmp_path / "a.parquet", columns))
     message = str(caught.value)
-    assert "torque_cmd_1 (or position_ref_1: logs of targets need no torque), ..." in message
+    assert "columns time_s, position_1, torque_cmd_1 (or position_ref_1)" in message
     assert f"got {', '.join([*names, 't'])} (9 columns); `axisight columns guess" in message
     many = {f"c{k:02}": np.ones(600) for k in range(13)}
     with pytest.raises(LogError, match=r"c10, c11, \.\.\. \(13 columns\)"):
@@ -197,10 +197,16 @@ def test_addresses_that_do_not_fit(tmp_path):
         ("sample_rate_hz = 1" + AXIS.replace('"rad"', '"grad"'), ["axis 1: position.unit", "grad"]),
         ("sample_rate_hz = 1" + AXIS.replace('"rad"', '"counts"'), ["counts_per_rev"]),
         ("sample_rate_hz = 1" + AXIS.replace('"Nm"', '"V"'), ["scale", "'V'"]),
-        ("sample_rate_hz = 1" + AXIS.replace('"rad"', '"mm"'), ["torque in Nm", "mm"]),
+        (
+            "sample_rate_hz = 1" + AXIS.replace('"rad"', '"mm"'),
+            ["torque: expected a unit that goes with a position in mm, got Nm"],
+        ),
         ("sample_rate_hz = 1" + AXIS.replace('"Nm"', '"Nm", index = "a"'), ["index", "'a'"]),
         ("sample_rate_hz = 1" + AXIS.replace('"Nm"', '"Nm", sign = 2'), ["sign", "2"]),
-        ("sample_rate_hz = 1" + AXIS.replace('"Nm"', '"Nm", scale = 0'), ["scale", "zero"]),
+        (
+            "sample_rate_hz = 1" + AXIS.replace('"Nm"', '"Nm", scale = 0'),
+            ["scale: expected a number other than 0"],
+        ),
         ("sample_rate_hz = ", ["expected TOML"]),
     ],
 )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.arguments import counted
 from axisight.effects import Effect, effect_info
 from axisight.gap.controller.torque_sensor import either, unseen_constant, with_torque_sensors
 from axisight.gap.facts.algebraic_cause import AlgebraicCause
@@ -360,9 +361,8 @@ def _checks(found: SearchState, settings: Settings, explained: float) -> tuple[s
     before = held_out_loss(found.baseline, like=found.model)
     size = float(found.baseline.samples.sum())
     left = float((held_out_loss(found.model) - found.floor).sum()) / size
-    rounds = len(found.rounds)
     out = [
-        f"{tried} fits of candidate effects compared in {rounds} round{'s' if rounds > 1 else ''}, on data left "
+        f"{tried} fits of candidate effects compared in {counted(len(found.rounds), 'round')}, on data left "
         "out of each fit.",
         f"Mean square of the residual above the floor: {(before - found.floor).sum() / size:.3f} "
         f"re-fitted, {left:.3f} with the causes (1 is noise plus {100 * settings.model_error:g} % model error).",
