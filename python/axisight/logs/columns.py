@@ -294,5 +294,12 @@ def _as_unit(given: object) -> str:
 
 def _keys() -> set[str]:
     """Return the keys of all tables of a column map."""
-    tables = {ColumnMap, AxisColumns, CsvOptions, TimeColumn, PositionColumn, TorqueColumn}
+    tables: set[type[_Strict]] = {
+        ColumnMap,
+        AxisColumns,
+        CsvOptions,
+        TimeColumn,
+        PositionColumn,
+        TorqueColumn,
+    }
     return {field.alias or name for table in tables for name, field in table.model_fields.items()}
