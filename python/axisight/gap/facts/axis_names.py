@@ -35,7 +35,7 @@ def axis_label(axis: int, names: Sequence[str]) -> str:
 
 
 def placed(label: str) -> str:
-    """Return a label in words: "backlash on axis 2", "another link mass on axis 1" (``link_mass@1``)."""
+    """Return the label of a candidate in words, such as "backlash on axis 2" or "another link mass on axis 1"."""
     effect, _, axes = label.partition("@")
     what = f"another {noun(effect)}" if always_there(effect) else phrase(effect)
     what = what.removeprefix("the machine's ")

@@ -212,5 +212,5 @@ def _on(
     causes: tuple[str, ...] = (),
 ) -> Withdrawal:
     """Return the contradiction with the figures of one log and axis (from 0), of squares (n_logs, n_axes)."""
-    figures = (float(np.sqrt(x[place])) for x in (before, after, _squares(stages.floor)))
-    return Withdrawal(why, *figures, axis=place[1] + 1, log=names[place[0]], causes=causes)
+    was, left, noise = (float(np.sqrt(x[place])) for x in (before, after, _squares(stages.floor)))
+    return Withdrawal(why, was, left, noise, place[1] + 1, names[place[0]], causes)

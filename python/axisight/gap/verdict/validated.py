@@ -60,8 +60,8 @@ def validated(
         if own is None or axis is None or len(own.axes) < 2:
             return Validated(found, errors, conclusion.with_checks(lost), reach, own)
         lost.append(
-            f"Axis {axis + 1}: the causes that explain it on the estimation logs are left out. That does not carry "
-            "over to the validation logs, where its gap does not shrink."
+            f"The causes found on axis {axis + 1} are left out: what explains the estimation logs there does not "
+            "carry over to the validation logs."
         )
         found = with_balanced_values(without_axis(found, view.fitter, axis), view.fitter)
 

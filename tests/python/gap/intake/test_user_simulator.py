@@ -187,7 +187,7 @@ def test_along_another_motion_the_gap_stays_that_of_the_model() -> None:
     assert found.simulator is not None
     assert not found.simulator.taken_off
     assert differs(found.simulator).tolist() == [0]
-    assert "your simulator goes other ways" in " ".join(found.checks)
+    assert "your simulator moves differently" in " ".join(found.checks)
 
 
 def test_motions_lie_apart_by_a_share_of_them() -> None:

@@ -230,7 +230,7 @@ def test_a_simulation_that_broke_off_has_no_place(base):
     ("change", "bound", "words"),
     [
         (0.02, False, None),
-        (-0.046, False, "3.1 of its tolerance of 1.5 %"),
+        (-0.046, False, "3.1 times its tolerance of 1.5 %"),
         (0.01, True, "at the bound of the fit"),
     ],
 )

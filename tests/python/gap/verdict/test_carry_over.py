@@ -73,7 +73,7 @@ def test_causes_that_leave_the_gap_are_withdrawn(after: float, why: str):
     assert (found.verdict, found.causes) == ("unknown", ())
     assert found.withdrawn is not None
     assert (found.withdrawn.why, found.withdrawn.causes) == (why, ("coulomb_friction@1",))
-    assert found.withdrawn.after == pytest.approx(after, rel=0.05)
+    assert found.withdrawn.after == pytest.approx(after * np.sqrt(2.0), rel=0.05)
     assert all(a.verdict == "unknown" and a.causes == () for a in found.axes)
 
 
@@ -109,7 +109,7 @@ def test_causes_that_leave_more_than_the_refit_alone_are_withdrawn():
     found = judged(named(), alone)
     assert found.verdict == "unknown"
     assert found.withdrawn is not None and found.withdrawn.why == "refit"
-    assert found.withdrawn.before == pytest.approx(0.05, rel=0.05)
+    assert found.withdrawn.before == pytest.approx(0.05 * np.sqrt(2.0), rel=0.05)
     # As much as the re-fit, to a twentieth of the noise: they may be what the re-fit stands for.
     assert judged(named(), replace(stages(0.9, 0.0505), refitted=floor.refitted)) == named()
 

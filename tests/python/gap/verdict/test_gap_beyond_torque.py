@@ -63,7 +63,7 @@ def test_what_a_low_pass_smears_is_told_with_a_better_one() -> None:
     left = Remainder(0.1, np.array([0.0, 0.1]), (place,))
     (finding,) = reversals_smeared(left, (slow,), 3.5)
     assert (finding.name, finding.axis) == ("reversals_smeared", 2)
-    assert "try --cutoff-hz 7" in finding.message
+    assert "Try --cutoff-hz 7" in finding.message
     # Elsewhere, in closed loop, and where nothing remains there is nothing to smear.
     assert reversals_smeared(left, (replace(slow, regime="speed: fast"),), 3.5) == ()
     assert reversals_smeared(left, (replace(slow, axis=1),), 3.5) == ()
