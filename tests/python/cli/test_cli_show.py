@@ -55,7 +55,7 @@ def test_positions_are_told_as_what_the_gains_command(shown):
     found = explained()
     text = shown(replace(found, gap=replace(found.gap, compared="positions")))
     for words in (
-        "compared: Positions under the same targets, their errors told as the torque",
+        "compared: Positions under the same targets. Errors are given as the torque",
         "sqrt(sum of squared errors / sum of squared commanded torques)",
         "remains above noise: 3.7 % of the commanded torque",
     ):

@@ -71,8 +71,8 @@ def drifting_clock(
     explained = float(1.0 - after.sum() / before.sum())
     doubt = _OF_THE_RATE * abs(rate)
     says = (
-        f"With a clock that is {1e6 * rate:.4g} ppm fast against that of the references the stated "
-        f"controller misses {100 * explained:.4g} % less of the logged torque."
+        f"The machine's clock is {1e6 * rate:.4g} ppm faster than that of the references. With that, the error of "
+        f"the stated controller against the logged torque falls by {100 * explained:.4g} %."
     )
     samples = sum(logs[i].n_samples for _, i in places.tolist())
     value = {CLOCK[1]: Interval(rate, rate - doubt, rate + doubt)}

@@ -288,8 +288,8 @@ def _causes(axis: int, law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> lis
         first, second = pieces[0].gains
         says = (
             f"Axis {axis + 1}: the logged torque is {law.factors[0]:.4g} times the {first} and "
-            f"{law.factors[1]:.4g} times the {second} share of the stated controller, "
-            f"which misses {100 * explained:.4g} % less so."
+            f"{law.factors[1]:.4g} times the {second} share of the stated controller. With these factors the error "
+            f"of its law falls by {100 * explained:.4g} %."
         )
         out.append(AlgebraicCause(OTHER_GAINS[0], axis + 1, values, samples, explained, says))
     if law.forward.any():
@@ -300,8 +300,8 @@ def _causes(axis: int, law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> lis
             for name, f, s in zip(FEEDFORWARD[1], law.forward, spread, strict=True)
         }
         says = (
-            f"Axis {axis + 1}: with {law.forward[0]:.4g} Nm per rad/s^2 and {law.forward[1]:.4g} Nm per rad/s "
-            f"of the reference the stated controller misses {100 * explained:.4g} % less of the logged torque."
+            f"Axis {axis + 1}: a feed-forward of {law.forward[0]:.4g} Nm per rad/s^2 and {law.forward[1]:.4g} Nm per "
+            f"rad/s of the reference lowers the error of the stated controller by {100 * explained:.4g} %."
         )
         out.append(AlgebraicCause(FEEDFORWARD[0], axis + 1, values, samples, explained, says))
     if law.lag_s:
@@ -309,8 +309,8 @@ def _causes(axis: int, law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> lis
         value = {SPEED_FILTER[1]: Interval(lag, lag * (1 - _OF_A_LAG), lag * (1 + _OF_A_LAG))}
         order = " of the second order that lags it by" if law.damping else " of"
         says = (
-            f"Axis {axis + 1}: with the measured speed through a low-pass{order} {1e3 * lag:.3g} ms the stated "
-            f"controller misses {100 * explained:.4g} % less of the logged torque."
+            f"Axis {axis + 1}: a low-pass{order} {1e3 * lag:.3g} ms on the measured speed lowers the error of the "
+            f"stated controller by {100 * explained:.4g} %."
         )
         out.append(AlgebraicCause(SPEED_FILTER[0], axis + 1, value, samples, explained, says))
     return out

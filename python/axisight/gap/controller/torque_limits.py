@@ -105,9 +105,9 @@ def _limit(axis: int, logs: Sequence[Log], commands: Sequence[Array]) -> Algebra
     low, middle, high = np.quantile(levels, [0.025, 0.5, 0.975])
     interval = Interval(float(middle), float(low), float(high))
     says = (
-        f"Axis {axis + 1}: {100 * at_top.mean():.3g} % of the logged torque stands at "
-        f"{interval.value:.4g} Nm where the controller's law asks for more; cut there, the law gives "
-        f"{100 * explained:.4g} % of what it misses otherwise."
+        f"Axis {axis + 1}: {100 * at_top.mean():.3g} % of the logged torque stands at {interval.value:.4g} Nm, where "
+        f"the controller's law asks for more. With a limit there the law explains {100 * explained:.4g} % of its "
+        "error."
     )
     name, parameter = TORQUE_LIMIT
     samples = int(at_top.sum())

@@ -1,4 +1,4 @@
-"""Causes that logs show by themselves, without a model of the machine."""
+"""Causes that logs show without a model of the machine."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from axisight.gap.facts.result import Interval
 class AlgebraicCause:
     """An effect of one axis (from 1), or of the arm, that logs show by themselves.
 
-    ``values``: its parameters; ``samples``: how many show it; ``explained``: share of what the
-    torque is off the controller's command that it takes away [1]; ``says``: what was seen, a sentence.
+    ``values``: its parameters; ``samples``: how many show it; ``explained``: share of the difference between
+    logged torque and the controller's command that it removes [1]; ``says``: a sentence on what was seen.
     """
 
     name: str

@@ -14,11 +14,11 @@ from axisight.excitation import References, write_references
 from axisight.gap.facts.axis_names import placed
 from axisight.storage import write_whole
 
-# Log-likelihood ratio at which the wrong rival is less likely than one in twenty.
+# Log-likelihood ratio at which the wrong rival has a probability below 5 %.
 ENOUGH = float(np.log(19.0))
-# Size, relative to the smallest that would show, at which an effect is named too: nine times of ten.
+# Size, relative to the detection limit, at which an effect is also named, with 90 % probability.
 NAMED = 2.0
-# How many times longer is as long, and how many are for ever.
+# Up to the first a multisine counts as equally long, from the second as too long to be of use.
 _AS_WELL, _NEVER = 1.5, 90.0
 
 
@@ -28,8 +28,8 @@ class Plan:
     """A motion, and how often to run it.
 
     ``motion``: what moves, in words; ``axes`` (from 1) that move; ``references``: one period of it,
-    motor side; ``repeats``: how often to run it; ``times_shorter``: a standard multisine on all axes
-    would have to be so many times as long for as much, or infinitely.
+    motor side; ``repeats``: how often to run it; ``times_shorter``: how many times as long a standard
+    multisine on all axes would have to be to tell as much, may be infinite.
     """
 
     motion: str
@@ -50,8 +50,8 @@ class Plan:
         if self.times_shorter > _NEVER:
             return "A multisine on all axes would not show it."
         if self.times_shorter < _AS_WELL:
-            return "A multisine on all axes does as well."
-        return f"A multisine on all axes would have to be {self.times_shorter:.2g} times as long."
+            return "A multisine on all axes is as good."
+        return f"A multisine on all axes would need {self.times_shorter:.2g} times the time."
 
 
 @summarized
@@ -113,12 +113,12 @@ class SeparatingExperiment(Experiment):
         one, other = (placed(label) for label in self.rivals)
         if not self.decides:
             return (
-                f"No motion within the limits of speed, travel and torque tells {one} from {other}: "
-                f"the best of those tried ({_begun_small(self.plan)}) makes the true one "
+                f"No motion within the limits of speed, travel and torque tells {one} from {other}. "
+                f"The best one tried ({_begun_small(self.plan)}) makes the true one "
                 f"{np.exp(self.log_ratio):.2g} times as likely."
             )
         return (
-            f"{self.plan}, tells {one} from {other}: the true one is then at least "
+            f"{self.plan}: tells {one} from {other}. The true one is then at least "
             f"{min(np.exp(self.log_ratio), 1e6):.2g} times as likely. {self.plan.beside_a_multisine()}"
         )
 
@@ -126,9 +126,9 @@ class SeparatingExperiment(Experiment):
 @summarized
 @dataclass(frozen=True, eq=False)
 class ShowingExperiment(Experiment):
-    """References that show an amplitude of an effect, if the machine has it.
+    """References that show an effect of a given size, if the machine has it.
 
-    ``effect``: as it was asked for; ``share``: its size relative to the smallest that would show with 95 % power.
+    ``effect``: as it was asked for; ``share``: its size relative to the smallest that shows with 95 % probability.
     """
 
     effect: Effect
@@ -150,13 +150,13 @@ class ShowingExperiment(Experiment):
                 else "never shows"
             )
             return (
-                f"No motion within the limits of speed, travel and torque shows {what}: with the "
-                f"best of those tried ({_begun_small(self.plan)}) it {larger}."
+                f"No motion within the limits of speed, travel and torque shows {what}. With the "
+                f"best one tried ({_begun_small(self.plan)}) it {larger}."
             )
-        named = "" if self.share >= NAMED else ": it may be seen and not named"
+        named = "" if self.share >= NAMED else " It may be seen without being named."
         return (
-            f"{self.plan}, shows {what} if it is there; the least that would show, nineteen times of "
-            f"twenty, is {100 / self.share:.0f} % of it{named}. {self.plan.beside_a_multisine()}"
+            f"{self.plan}: shows {what} if it is there. The smallest size that would show with 95 % "
+            f"probability is {100 / self.share:.0f} % of it.{named} {self.plan.beside_a_multisine()}"
         )
 
 

@@ -1,4 +1,4 @@
-"""What a reader should know before believing a diagnosis: faults, each with a stable name."""
+"""Faults of simulator and logs that a reader of a diagnosis has to know, each with a stable name."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ MEANINGS: dict[str, str] = {
     "refit_worse": "a re-fit of the simulator's own parameters that held-out logs contradict",
     "parameter_at_edge": "a parameter of the simulator that the re-fit took to the edge of its tolerance",
 }
-"""Every name, and what it stands for. Names are part of the interface: they are never changed."""
+"""Every name and its meaning. Names are part of the interface and never change."""
 
 
 NEEDED = frozenset(
@@ -95,7 +95,7 @@ NEEDED = frozenset(
         "time_jitter",
     }
 )
-"""What a diagnosis cannot do without, whatever anybody says."""
+"""Faults that ``despite`` cannot override: no diagnosis is possible with them."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class RefusedInputError(CaseError, LogError):
 def flagged(findings: Iterable[Finding], names: Collection[str]) -> list[Finding]:
     """Return the findings with those of ``names`` flagged where they were refused."""
     return [
-        replace(f, severity="flag", message=f"{f.message} (taken despite that, as asked for)")
+        replace(f, severity="flag", message=f"{f.message} (used all the same, as asked for)")
         if f.severity == "refuse" and f.name in names
         else f
         for f in findings
@@ -163,7 +163,7 @@ def flagged(findings: Iterable[Finding], names: Collection[str]) -> list[Finding
 
 
 def check_names(names: Collection[str]) -> None:
-    """Raise InputError for what is no name of a fault that a diagnosis can be made with."""
+    """Raise InputError for a name that is no fault, or one of `NEEDED`."""
     for name in names:
         if name not in MEANINGS or name in NEEDED:
             known = ", ".join(n for n in MEANINGS if n not in NEEDED)
@@ -171,5 +171,5 @@ def check_names(names: Collection[str]) -> None:
 
 
 def refused(findings: Iterable[Finding]) -> bool:
-    """Whether any of the findings is one that no diagnosis can be made with."""
+    """Whether any of the findings rules out a diagnosis."""
     return any(finding.severity == "refuse" for finding in findings)

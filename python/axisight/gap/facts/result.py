@@ -1,4 +1,4 @@
-"""What a diagnosis says: data only, so that a figure or a page can be made again."""
+"""Result of a diagnosis: data only, from which every figure and page can be made again."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class Pooled:
     """Torque error of the whole arm as identification papers give it: sqrt(sum e^2 / sum u^2) [1].
 
     Sums over all samples, axes and validation logs; e is simulated minus measured torque, u the
-    measured torque itself, not about its mean. Heavy axes weigh more than in `Gap`. ``before``,
-    ``refitted``, ``after`` and ``floor`` as there.
+    measured torque itself, not about its mean. Axes with large torques weigh more than in `Gap`. ``before``,
+    ``refitted``, ``after`` and ``floor`` as in `Gap`.
     """
 
     before: float
@@ -84,7 +84,7 @@ class MotionErrors:
     velocity_from: VelocityFrom
 
     def rows(self) -> list[tuple[float, ...]]:
-        """Return of each axis position before, after and noise alone, then velocity; as `MOTION_HEAD` says."""
+        """Return a row an axis: position before, after and noise alone, then velocity; columns as `MOTION_HEAD`."""
         stages = [
             getattr(of, stage)
             for of in (self.position_rad, self.velocity_rad_s)
@@ -106,11 +106,10 @@ class Gap:
 
     ``before``: the simulator as given; ``refitted``: its own parameters fitted
     within their tolerances, no effect added; ``after``: with the causes added;
-    ``floor``: what a perfect model would still leave (sensor noise). The
-    ``*_per_axis`` arrays have shape (n_axes,). ``pooled`` is None where axes that turn
-    and axes that slide cannot be summed. Where ``compared`` is ``"positions"``, torques are what the stated gains
-    command along those of machine and simulator, and ``motion`` has the errors of positions and velocities
-    themselves; None of torques.
+    ``floor``: the gap that a perfect simulator would still have (sensor noise). The
+    ``*_per_axis`` arrays have shape (n_axes,). ``pooled`` is None where the robot has axes that turn and
+    axes that slide. Where ``compared`` is ``"positions"``, torques are those that the stated gains command along
+    the positions of machine and simulator, and ``motion`` has the errors of positions and velocities; else None.
     """
 
     before: float
@@ -129,7 +128,11 @@ class Gap:
 @summarized
 @dataclass(frozen=True)
 class Where:
-    """One place where the gap lies. ``share`` of the squared gap above the floor [1]."""
+    """One place where the gap lies.
+
+    ``share`` [1] of the squared gap above the floor: of an *unknown* arm on axes that are *unknown*, else of the
+    gap before the causes. ``evidence``: the same in words.
+    """
 
     axis: int
     share: float
@@ -141,11 +144,11 @@ class Where:
 @summarized
 @dataclass(frozen=True)
 class Remainder:
-    """What stands above the floor on the validation logs with the causes in.
+    """The gap above the floor that is left on the validation logs with the causes in.
 
-    ``gap``: sqrt(after^2 - floor^2) [1], zero where noise is all there is; ``per_axis``: the same by
-    axis, (n_axes,). ``where``: the places that stand out of the floor, shares of the squared
-    remainder; none where no axis stands out. ``varies_with``: the variable that it follows at the
+    ``gap``: sqrt(after^2 - floor^2) [1], zero where only noise is left; ``per_axis``: the same by
+    axis, (n_axes,). ``where``: the places above the floor, with shares of the squared
+    remainder; empty where no axis is above it. ``varies_with``: the variable that it follows at the
     first place (``speed``, ``direction``, ``position``, ``acceleration``, ``load`` or ``time``), if any.
     """
 
@@ -223,11 +226,11 @@ class Cause:
 @summarized
 @dataclass(frozen=True)
 class AxisVerdict:
-    """What the estimation logs say of one axis (from 1).
+    """Verdict of one axis (from 1); `axisight.gap.verdict.axis_verdicts` has the rule.
 
-    ``excess``: mean square of the weighted residual of the re-fitted simulator above the floor,
+    ``excess``: mean square of the residual of the re-fitted simulator above the floor on the estimation logs,
     in units of noise plus model error; ``explained``: share of it that the causes remove;
-    ``causes``: which of the diagnosis's causes act on the axis.
+    ``causes``: places of the causes that act on the axis. A cause of the whole arm acts on axes with a gap.
     """
 
     axis: int
@@ -264,12 +267,12 @@ class Candidate:
 @summarized
 @dataclass(frozen=True)
 class DetectionLimit:
-    """The smallest amplitude of an effect that the logs would have shown, nineteen times of twenty.
+    """The smallest amplitude of an effect that the logs would have shown with 95 % probability.
 
-    ``parameter`` is the first amplitude that no plainer law has; ``others`` are what the other parameters
-    are then. ``value`` in ``unit``, None where no size that the effect may have would show: for what is
-    in ``hidden``, the ``"tolerances"`` of the simulator's own parameters, which with a plainer law make up for it,
-    or the ``"motion"``, which hardly brings it out. ``axis`` from 1, None for the arm.
+    ``parameter`` is the first amplitude that no plainer law has; ``others`` are the values of the other
+    parameters. ``value`` in ``unit``; None where no possible size would show. Then ``hidden`` says why:
+    ``"tolerances"`` of the simulator's own parameters make up for it, together with a plainer law, or the
+    ``"motion"`` hardly excites it. ``axis`` from 1, None for the arm.
     """
 
     effect: str
@@ -338,20 +341,20 @@ class Diagnosis:
     each a Dataset with ``share`` (of that axis's squared baseline error above
     the floor), ``excess`` (ratio of the squared error to the floor) and
     ``significance`` (in standard errors). Band and bin coordinates are labels.
-    ``detection_limits``: what these logs would have shown of each effect that is no cause.
+    ``detection_limits``: of each effect that is no cause.
     ``refit``: relative change of the simulator's own parameters [1]. ``settings``: what was set, by
     the names of `Settings`.
-    ``findings``: faults of robot file and logs with which a diagnosis still makes sense, and
-    parameters that the re-fit took to the edge of their tolerance. ``experiment``: what tells the
-    causes apart that stay open, or shows an effect, where it was asked for. ``simulator``: how far the
-    model reproduces the user's own, where its logs were given.
-    ``signals``: where they were asked for, of each log, estimation logs first, a Dataset with the dims (time_s,
+    ``findings``: faults of robot file and logs that do not rule out a diagnosis, and
+    parameters that the re-fit took to the edge of their tolerance. ``experiment``, if asked for: an experiment
+    that separates open causes, or shows an effect. ``simulator``: how far the
+    model reproduces the user's own simulator, where its logs were given.
+    ``signals``, if asked for: of each log, estimation logs first, a Dataset with the dims (time_s,
     axis) [Nm, N on a prismatic axis; motor side]: ``measured_torque_nm``; ``simulated_before_torque_nm`` of the
     simulator as given and ``simulated_after_torque_nm`` of the re-fitted one with the causes, those behind
     ``gap.before`` and ``gap.after``; ``residual_before_torque_nm`` and ``residual_after_torque_nm``, simulated
     less measured. Attributes are ``log``, ``role``, ``mode``, ``torque`` (``logged``, or not), and
     ``lowpass_hz`` where all signals are low-passed: by inverse dynamics.
-    ``trace``: what the search compared, what each rule added to a log-weight, and what each move did.
+    ``trace``: the comparisons and moves of the search, with every rule that changed a log-weight.
     """
 
     name: str

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 LARGEST = 10.0
-"""Share of the torque beyond which a gap is none: no effect that a simulator lacks does that."""
+"""Share of the torque from which a gap is no measure: units, gravity or the controller are wrong then."""
 
 
 def listed(items: Sequence[str], last: str = "and") -> str:
@@ -15,7 +15,7 @@ def listed(items: Sequence[str], last: str = "and") -> str:
 
 
 def percent(x: float) -> str:
-    """Return a share in per cent, three digits; what is no share any more is not told as one."""
+    """Return a share in per cent with three digits; "more than 1,000 %" above `LARGEST`."""
     if not math.isfinite(x):
         return "no share"
     return f"{100 * x:.3g} %" if x <= LARGEST else f"more than {100 * LARGEST:,.0f} %"

@@ -60,8 +60,7 @@ def chance_check(stages: Stages, judged: Stages) -> tuple[str, ...]:
         return ()
     apart = percent(float(np.sqrt(judged.floor.mean())))
     return (
-        f"With its causes the machine takes another course at the least disturbance: by noise alone two "
-        f"runs of the validation logs would differ by {apart} of the {torque_of(stages.compared)}, and no simulator "
-        f"can come closer. Kept on these logs, it explains at least {100 * _FOLLOWED:.0f} % of what there is to "
-        "explain.",
+        f"With these causes the motion is chaotic: by noise alone two runs of the validation logs differ by {apart} "
+        f"of the {torque_of(stages.compared)}, and no simulator can come closer. Kept on these logs, it explains at "
+        f"least {100 * _FOLLOWED:.0f} % of the gap.",
     )

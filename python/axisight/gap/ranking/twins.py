@@ -57,11 +57,10 @@ def about_twins(causes: Sequence[NamedCause], n_axes: int) -> tuple[str, ...]:
     out = []
     for c in causes:
         there = "" if c.axis is None else f" on axis {c.axis}"
-        name = phrase(c.effect)
         others = " or ".join(phrase(n) for n in twins_of(c.effect, n_axes))
         if others:
             out.append(
-                f"{name[:1].upper()}{name[1:]}{there} gives the same logs as {others}. The more common effect "
-                "is named. A second sensor (joint encoder or torque sensor) tells them apart."
+                f"{others[:1].upper()}{others[1:]} would give the same logs as {phrase(c.effect)}{there}. The more "
+                "common one is named. A second sensor, on the joint or of the torque, would tell them apart."
             )
     return tuple(out)

@@ -1,4 +1,4 @@
-"""From a search to a verdict in words: none, explained, unknown or undecidable."""
+"""From a finished search to a verdict: none, explained, unknown or undecidable."""
 
 from __future__ import annotations
 
@@ -138,10 +138,9 @@ def conclude(
 ) -> Conclusion:
     """Draw the verdict from a finished search.
 
-    ``stands_out``: whether the plain torque error of the re-fitted simulator lies
-    above the noise; without, what no effect explains is taken for noise of an unexpected colour, as far as
-    noise can be that. ``shown``: causes that
-    the logs show by themselves; they come first.
+    ``stands_out``: whether the plain torque error of the re-fitted simulator lies above the noise. Otherwise
+    an unexplained residual counts as noise of an unexpected colour, up to what noise can be. ``shown``: causes
+    that the logs show by themselves; they come first.
     """
     accepted = found.accepted
     explained = found.explained()
@@ -269,7 +268,7 @@ def _open(winner: RankedHypothesis, standing: AxisPosterior, accepted: set[str])
 def _axes(
     found: SearchState, settings: Settings, causes: Sequence[NamedCause], *, gap: bool
 ) -> tuple[AxisVerdict, ...]:
-    """Return what the estimation logs say of each axis."""
+    """Return what the estimation logs say of each axis; `axis_verdicts` has the last word on its verdict."""
     excess, removed = found.to_explain(), found.removed()
     samples = found.layout.samples()
     out = []

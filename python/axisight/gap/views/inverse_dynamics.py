@@ -170,30 +170,30 @@ class InverseView(View):
 
     def remarks(self) -> tuple[str, ...]:
         """Say how the logs were filtered, and what the floor is made of."""
-        chosen = "chosen as what predicts data left out best"
+        chosen = "the cutoff that predicts held-out data best"
         highest = rigid_below_hz(self.robot)
         if self.settings.cutoff_hz:
             chosen = "as given"
         elif np.isfinite(highest):
             chosen += f", below a third of the first elastic mode ({highest:.3g} Hz)"
         out = [
-            f"Torques, predicted and measured, and their noise are low-passed alike at "
-            f"{self.filtering.cutoff_hz:.3g} Hz, {chosen}; the motion an octave above."
+            f"Predicted torque, measured torque and noise pass the same low-pass of "
+            f"{self.filtering.cutoff_hz:.3g} Hz, {chosen}. The motion is low-passed an octave above."
         ]
         cut = [log.name for log in self.logs if self.filtering.counted(log).min() < 1]
         if cut:
             out.append(
-                f"{', '.join(cut)}: where a log begins or ends in motion, no low-pass knows the torque before "
-                f"or after it; 1.5 of its periods there count for nothing."
+                f"{', '.join(cut)} begins or ends in motion. The low-pass does not know the torque outside the log, "
+                f"so 1.5 of its periods there do not count."
             )
         axes = [str(axis) for axis, used in enumerate(self.filtering.measured, 1) if used]
         if axes:
             out.append(
                 f"Velocity and acceleration of axis {', '.join(axes)} come from the measured velocity, "
-                f"which predicts data left out better than the position does."
+                f"which predicts held-out data better than the position does."
             )
         if self.noise.repeated:
-            out.append("The floor is what repeats of one motion differ by.")
+            out.append("The floor is the difference between repeats of one motion.")
         return tuple(out)
 
 

@@ -210,8 +210,8 @@ class TargetsView(View):
             return (said,)
         return (
             said,
-            f"The simulator's steps take more inertia than the motor has on axis {short} (speed gains that are "
-            f"explicit): it is taken as none, and the simulator is reproduced less well there.",
+            f"On axis {short} the steps of the simulator need more inertia than the motor has (explicit speed "
+            f"gains). The motor counts as massless there, and the simulator is reproduced less well.",
         )
 
 

@@ -39,7 +39,7 @@ def test_a_fault_is_flagged_where_one_goes_on_despite_it() -> None:
     found = diagnose(robot=ROBOT, estimation=estimation, validation=LOGS[2:], settings=settings)
     (fault,) = [f for f in found.findings if f.name == "rows_missing"]
     assert fault.severity == "flag"
-    assert fault.message.endswith("(taken despite that, as asked for)")
+    assert fault.message.endswith("(used all the same, as asked for)")
     verdict = found.to_verdict()
     assert verdict["settings"]["despite"] == ["rows_missing"]
     jsonschema.validate(verdict, verdict_schema())

@@ -139,7 +139,7 @@ def test_screen_report_and_verdict_tell_them(capsys: pytest.CaptureFixture) -> N
     show_diagnosis(found, verbose=True)
     page, notebook = render_report(found), found._repr_html_()
     for text in (capsys.readouterr().out, page, notebook):
-        assert "velocities as they were logged" in " ".join(text.split())
+        assert "Velocities are those logged" in " ".join(text.split())
         for number in ("0.00123", "0.00045", "0.00021", "0.0321", "0.0054", "0.0032"):
             assert number in text
     motion = found.to_verdict()["gap"]["motion"]
