@@ -60,7 +60,7 @@ def about_twins(causes: Sequence[NamedCause], n_axes: int) -> tuple[str, ...]:
         others = " or ".join(phrase(n) for n in twins_of(c.effect, n_axes))
         if others:
             out.append(
-                f"{others[:1].upper()}{others[1:]} would give the same logs as {phrase(c.effect)}{there}. The more "
-                "common one is named. A second sensor, on the joint or of the torque, would tell them apart."
+                f"{phrase(c.effect)[:1].upper()}{phrase(c.effect)[1:]}{there} gives the same logs as {others}. "
+                "The more common one is named. A second sensor, on the joint or of the torque, would tell them apart."
             )
     return tuple(out)

@@ -218,8 +218,8 @@ class TargetsView(View):
 def what_is_compared(rate_hz: float) -> str:
     """Return a sentence that says what is compared of logs of a rate [Hz]."""
     return (
-        f"No torque was logged: positions are compared under the same targets, up to {_BAND * rate_hz:.3g} Hz, "
-        "and their errors told as the torque that the stated gains make of them."
+        f"No torque was logged: positions are compared under the same targets, up to {_BAND * rate_hz:.3g} Hz. "
+        "Their errors are given as the torque that the stated gains command."
     )
 
 

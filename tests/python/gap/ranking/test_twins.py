@@ -63,7 +63,7 @@ def test_they_are_said_and_others_are_not():
     causes = [cause("torque_offset", 3), cause("backlash", 1)]
     assert open_twins(causes, 3) == (("torque_offset@3", "torque_sensor_offset@3"),)
     (says,) = about_twins(causes, 3)
-    assert "a torque offset on axis 3" in says and "a torque sensor offset" in says
+    assert "A torque offset on axis 3" in says and "a torque sensor offset" in says
     assert less_their_twins(causes, 3)[1] is not None
     assert less_their_twins(causes, 3)[1].probability == 0.9
 
