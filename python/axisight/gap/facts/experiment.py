@@ -28,7 +28,7 @@ class Plan:
     """A motion, and how often to run it.
 
     ``motion``: what moves, in words; ``axes`` (from 1) that move; ``references``: one period of it,
-    motor side; ``repeats``: how often to run it; ``times_shorter``: how many times as long a standard
+    motor side; ``repeats``: how often to run it. ``times_shorter``: how many times as long a standard
     multisine on all axes would have to be to tell as much, may be infinite.
     """
 

@@ -102,10 +102,14 @@ NEEDED = frozenset(
 class Finding:
     """One fault of a simulator or its logs, found by the gate or by the re-fit.
 
-    ``name``: one of ``MEANINGS``; ``severity``: ``"refuse"`` where the data cannot be what they
-    claim, ``"flag"`` where a diagnosis still makes sense; ``log``: name of the log, None for the
-    robot file or all logs; ``axis``: from 1, None where it concerns all or none; ``field``: column, key or parameter;
-    ``message``: what was expected, what came, and what to do.
+    | field | content |
+    |---|---|
+    | ``name`` | one of ``MEANINGS`` |
+    | ``severity`` | ``"refuse"`` where the data cannot be what they claim, ``"flag"`` where a diagnosis makes sense |
+    | ``log`` | name of the log, None for the robot file or all logs |
+    | ``axis`` | from 1, None where it concerns all or none |
+    | ``field`` | column, key or parameter |
+    | ``message`` | what was expected, what came, and what to do |
     """
 
     name: str

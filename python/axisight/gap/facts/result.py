@@ -163,11 +163,11 @@ class Remainder:
 class Reproduction:
     """How far the model reproduces the user's own simulator along the same references.
 
-    ``per_axis`` (n_axes,): rms of the difference of torques over the rms of the user's about its mean
-    [1]; ``of_gap`` (n_axes,): the same over the rms of the error of the user's simulator, of the model
-    where nothing was ``taken_off``: whether the differences were taken off the logs, so that the gap is
-    that of the user's simulator; not by inverse dynamics along motions that are too far apart. ``where``
-    they lie, of what exceeds the noise of the logs.
+    ``per_axis`` (n_axes,): rms of the difference of torques over the rms of the user's torque about its mean
+    [1]. ``of_gap`` (n_axes,): the same over the rms error of the user's simulator, or of the model where nothing
+    was taken off. ``taken_off``: whether the difference was subtracted from the logs, so that the gap is that of
+    the user's simulator; not by inverse dynamics along motions that are too far apart. ``where`` the
+    difference exceeds the noise of the logs.
     """
 
     per_axis: Array
@@ -229,7 +229,7 @@ class AxisVerdict:
     """Verdict of one axis (from 1); `axisight.gap.verdict.axis_verdicts` has the rule.
 
     ``excess``: mean square of the residual of the re-fitted simulator above the floor on the estimation logs,
-    in units of noise plus model error; ``explained``: share of it that the causes remove;
+    in units of noise plus model error. ``explained``: share of it that the causes remove.
     ``causes``: places of the causes that act on the axis. A cause of the whole arm acts on axes with a gap.
     """
 
@@ -348,10 +348,10 @@ class Diagnosis:
     parameters that the re-fit took to the edge of their tolerance. ``experiment``, if asked for: an experiment
     that separates open causes, or shows an effect. ``simulator``: how far the
     model reproduces the user's own simulator, where its logs were given.
-    ``signals``, if asked for: of each log, estimation logs first, a Dataset with the dims (time_s,
-    axis) [Nm, N on a prismatic axis; motor side]: ``measured_torque_nm``; ``simulated_before_torque_nm`` of the
-    simulator as given and ``simulated_after_torque_nm`` of the re-fitted one with the causes, those behind
-    ``gap.before`` and ``gap.after``; ``residual_before_torque_nm`` and ``residual_after_torque_nm``, simulated
+    ``signals``, if asked for: a Dataset for each log, estimation logs first, with the dims (time_s, axis)
+    [Nm, N on a prismatic axis; motor side]. ``measured_torque_nm``. ``simulated_before_torque_nm`` of the
+    simulator as given, ``simulated_after_torque_nm`` of the re-fitted one with the causes: those behind
+    ``gap.before`` and ``gap.after``. ``residual_before_torque_nm`` and ``residual_after_torque_nm``: simulated
     less measured. Attributes are ``log``, ``role``, ``mode``, ``torque`` (``logged``, or not), and
     ``lowpass_hz`` where all signals are low-passed: by inverse dynamics.
     ``trace``: the comparisons and moves of the search, with every rule that changed a log-weight.

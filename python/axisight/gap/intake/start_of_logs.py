@@ -1,6 +1,6 @@
-"""Logs of a loop that begin in motion: taken from where they stand, run up to, or without their references.
+"""Logs of a closed loop that begin in motion: cut, run up to, or compared without their references.
 
-A simulation of the loop begins at rest. What a controller had summed up before a log is in no log.
+A simulation of the loop begins at rest. The state of the controller before a log is in no log.
 """
 
 from __future__ import annotations
@@ -45,13 +45,17 @@ def from_rest(
     simulated: Sequence[Log],
     despite: Collection[str] = (),
 ) -> Begun:
-    """Return logs along which the loop can be simulated, each from where it begins.
+    """Return logs along which the loop can be simulated.
 
-    Those that begin in motion are cut where they first stand. One that never does is cut where a simulation
-    that is run up to its first motion has forgotten how it began, what is before it in its run-up; where
-    that is not to be had of one, all are without references. ``simulated``: of the user's own simulator, one
-    for each log or none; they are cut alike. ``despite`` as in `Settings`. Unchanged where the loop is not
-    simulated along the logs.
+    | log | used |
+    |---|---|
+    | begins at rest | as it is |
+    | begins in motion, stands later | from where all axes first stand |
+    | never stands | from where a simulation that is run up to it has forgotten its start; the rest is run-up |
+    | no such run-up exists | all logs without their references, by inverse dynamics |
+
+    ``simulated``: logs of the user's own simulator, one for each log or none; they are cut alike. ``despite`` as
+    in `Settings`. Unchanged where the loop is not simulated along the logs.
     """
     logs = [*estimation, *validation]
     given = Begun(list(estimation), list(validation), list(simulated))
@@ -82,10 +86,11 @@ def from_rest(
 
 
 def _moving(run_ups: _RunUps, logs: list[Log], *, simulates: bool) -> list[bool]:
-    """Return which logs begin in motion; where positions leave it open, by what a simulation has of their torque.
+    """Return which logs begin in motion.
 
-    Where one does, others that leave it open do too: they were logged alike. At rest where it is open and
-    none can be run up to them.
+    Where the positions of a log leave it open, the logged torque decides, beside that of a simulation from rest
+    and of one that is run up. If any log begins in motion, so do all that leave it open: they were logged alike.
+    Open logs to which no simulation can be run up count as at rest.
     """
     robot = run_ups.robot
     noise = np.maximum(position_noise_std(logs), robot.position_noise_std)

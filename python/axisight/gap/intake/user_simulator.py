@@ -1,4 +1,4 @@
-"""The user's own simulator: how far the model here stands for it, and its gap in the place of the model's."""
+"""The user's own simulator: how far the model reproduces it, and its gap instead of the model's."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from axisight.logs import Log
 
 Array = NDArray[np.float64]
 
-# Share of the gap of the user's simulator below which it does not matter what the model leaves out of
-# it: a tenth of the squared gap.
+# Share of the gap of the user's simulator below which its difference from the model does not matter: a tenth
+# of the squared gap.
 _HARMLESS = 0.1**0.5
 # Of references and sample times that are the same but for rounding.
 _SAME = 1e-3
@@ -67,7 +67,7 @@ def _finding(found: Reproduction, axis: int) -> Finding:
 
 
 def paired(logs: Sequence[Log], simulated: Sequence[Log]) -> list[Log]:
-    """Return the logs of the user's simulator, each with what drove the log beside it.
+    """Return the logs of the user's simulator, each with the references of its measured log.
 
     Raises InputError where they are not runs of the same motions: another number of logs or axes,
     another rate or length, other references.
@@ -110,9 +110,9 @@ def _paired(log: Log, own: Log) -> Log:
 
 @dataclass(frozen=True)
 class Difference:
-    """What the user's simulator is off the model along each log: (n, n_axes) each.
+    """Difference between the user's simulator and the model along each log: (n, n_axes) each.
 
-    ``torques_nm`` as they are compared, and ``taken_nm`` as they are taken off logs; ``positions_rad`` of the
+    ``torques_nm`` as they are compared, ``taken_nm`` as they are subtracted from logs; ``positions_rad`` of the
     motors; ``theirs_nm``: torques of the user's simulator.
     """
 
@@ -122,10 +122,9 @@ class Difference:
     positions_rad: tuple[Array, ...]
 
     def taken_from(self, logs: Sequence[Log]) -> list[Log]:
-        """Return logs with it taken off: what is left to the model is the gap of the user's simulator.
+        """Return logs less the difference: the gap of the model along them is that of the user's simulator.
 
-        To first order of the difference, for the loop of the machine answers to both; by inverse dynamics as
-        far as both go the same way.
+        In closed loop to first order of the difference, by inverse dynamics as far as both move alike.
         """
         each = zip(logs, self.taken_nm, self.positions_rad, strict=True)
         return [_less(log, u, x) for log, u, x in each]
@@ -142,9 +141,9 @@ def _less(log: Log, torque_nm: Array, position_rad: Array) -> Log:
 
 
 def difference(view: View, simulated: Sequence[Log], settings: Settings) -> Difference:
-    """Return what ``simulated`` logs are off the model of ``view``.
+    """Return the difference between ``simulated`` logs and the model of ``view``.
 
-    By inverse dynamics the model goes the motion of each log, and positions differ by nothing.
+    By inverse dynamics the model follows the motion of each log, so positions do not differ.
     """
     theirs = tuple(view.measured(own) for own in simulated)
     ours = view.torques(AS_GIVEN, simulated)
@@ -163,11 +162,11 @@ def difference(view: View, simulated: Sequence[Log], settings: Settings) -> Diff
 def reproduction(
     view: View, logs: Sequence[Log], simulated: Sequence[Log], off: Difference, settings: Settings
 ) -> Reproduction:
-    """Return how far the model of ``view`` reproduces the user's simulator, which is ``off`` it by so much.
+    """Return how far the model of ``view`` reproduces the user's simulator, from their difference ``off``.
 
-    In closed loop the difference can be taken off the logs. By inverse dynamics it can where both go the same
-    way: it is known along the motions of ``simulated``, and dry friction, which turns round with the speed, is
-    off by the root of the share by which these lie apart.
+    In closed loop the difference can be subtracted from the logs. By inverse dynamics it is known along the
+    motions of ``simulated`` only, so these have to be close to the measured ones. Dry friction changes sign
+    with the speed: its error is the root of the share by which the motions lie apart.
     """
     real = [view.measured(log) for log in logs]
     counts = [view.counted(log) for log in logs]

@@ -1,8 +1,8 @@
 """Whether positions follow their references, where the controller's law says nothing.
 
-With a controller that is not the one of the robot file, or a torque that is not the command, what
-remains is that a controlled axis follows its reference: the derivative of its position, low-passed, is
-the reference, in size and sign.
+The law says nothing where the machine has another controller than the robot file, or where the logged torque
+is not the command. One fact remains: a controlled axis follows its reference. The low-passed derivative of its
+position has the size and the sign of the reference.
 """
 
 from __future__ import annotations

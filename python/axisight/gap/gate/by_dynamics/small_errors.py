@@ -1,8 +1,14 @@
 """Small errors of a log by the simulator's inverse dynamics: clocks apart, encoders off their zero.
 
-All of them act in first order: a late torque is its rate times the delay, an axis that is late changes
-the torques of the others by what its motion does in that time, an encoder off its zero turns gravity.
-One regression has them all, beside a factor of the prediction, friction and an offset on every axis.
+Each error changes the predicted torque in proportion to its size:
+
+| error | change of the torque |
+|---|---|
+| a late torque | its rate times the delay |
+| an axis that is late | the effect of its motion during the delay on the torques of all axes |
+| an encoder off its zero | that of gravity in the turned pose |
+
+One regression estimates them all, beside a factor of the prediction, friction and an offset on every axis.
 """
 
 from __future__ import annotations
