@@ -360,7 +360,6 @@ def _checks(found: SearchState, settings: Settings, explained: float) -> tuple[s
     before = held_out_loss(found.baseline, like=found.model)
     size = float(found.baseline.samples.sum())
     left = float((held_out_loss(found.model) - found.floor).sum()) / size
-    rounds = counted(len(found.rounds), "round")
     out = [
         f"{tried} fits of candidate effects compared in {counted(len(found.rounds), 'round')}, on data left "
         "out of each fit.",
