@@ -6,6 +6,7 @@ Usage: python docs/make_plots.py [--page-only]
 import argparse
 import io
 import json
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -137,7 +138,8 @@ def render() -> str:
     for path, (given, said) in SHOWN.items():
         name = path.rpartition(".")[2]
         parts += [f"## `{name}`", said, f"```text\n{path}({given})\n```"]
-        parts.append(f"![{said}](images/plots/{name}.png)")
+        alternative = re.sub(r" \(\[.*?\]\(.*?\)\)", "", said)
+        parts.append(f"![{alternative}](images/plots/{name}.png)")
     return "\n\n".join(part.strip() for part in parts) + "\n"
 
 
