@@ -21,10 +21,14 @@ HEAD = """\
 
 # Commands
 
-`axisight COMMAND --help` says the same. Outputs replace earlier results of their kind and nothing
-else, unless told to by `--force` ([the rule](outputs.md#output-files)). Exit status: 0 done, 1 a search
-did not converge, 2 something was refused, by name; `diagnose --exit-code` adds the verdict. Commands that
-do more than print take `--quiet` (`-q`): errors only ([in a shell](outputs.md#in-a-shell)).
+This page lists every command with its arguments and options, as `axisight COMMAND --help` prints them.
+
+- **Outputs** replace earlier results of their kind and nothing else. `--force` replaces any file
+  ([the rule](diagnosis.md#outputs)).
+- **Exit status**: 0 done, 1 a search did not converge or a log does not pass, 2 an input was refused.
+  `diagnose --exit-code` adds the verdict.
+- **`--quiet` (`-q`)** prints errors only. All commands take it that do more than print
+  ([in a shell](diagnosis.md#in-a-shell)).
 
 """
 
@@ -92,7 +96,9 @@ class Parameter:
         names = own or [f"--{self.name.replace('_', '-')}"]
         if self.kind is bool and not own and self.default is True:
             names.append(f"--no-{names[0].removeprefix('--')}")
-        called = ", ".join(f"`{name}`" for name in names) if self.is_option else f"`{self.word}`"
+        called = (
+            ", ".join(f"`{name}`" for name in names) if self.is_option else f"`{cell(self.word)}`"
+        )
         if self.is_option and self.value:
             called += f" {cell(self.value)}"
         notes = [" ".join((self.info.help or "").split())]

@@ -245,9 +245,9 @@ def diagnose_command(
 ) -> None:
     """Find why the simulator differs from the logs: which causes, of what size, how sure.
 
-    axisight diagnose CASE --report report.html
+    A case: `axisight diagnose CASE --report report.html`
 
-    axisight diagnose LOG LOG --model robot.urdf --columns map.toml
+    Own logs: `axisight diagnose LOG LOG --model robot.urdf --columns map.toml`
     """
     if fleet is not None:
         for_one = {

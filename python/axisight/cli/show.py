@@ -185,7 +185,9 @@ def _limits(found: Diagnosis) -> list[Table]:
     for first in range(0, len(limits.columns), _PLACES):
         shown = slice(first, first + _PLACES)
         table = Table(
-            title=None if first else "smaller would not have shown (95 % power)",
+            title=None
+            if first
+            else "detection limits: smallest effect that shows (95 % probability)",
             box=SIMPLE_HEAD,
             padding=0,
         )
