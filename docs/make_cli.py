@@ -24,11 +24,11 @@ HEAD = """\
 This page lists every command with its arguments and options, as `axisight COMMAND --help` prints them.
 
 - **Outputs** replace earlier results of their kind and nothing else. `--force` replaces any file
-  ([the rule](diagnosis.md#outputs)).
+  ([the rule](outputs.md#output-files)).
 - **Exit status**: 0 done, 1 a search did not converge or a log does not pass, 2 an input was refused.
   `diagnose --exit-code` adds the verdict.
 - **`--quiet` (`-q`)** prints errors only. All commands take it that do more than print
-  ([in a shell](diagnosis.md#in-a-shell)).
+  ([in a shell](outputs.md#in-a-shell)).
 
 """
 
