@@ -53,7 +53,7 @@ def make_command(
         str | None, typer.Option(help="One of the motion plans. Default: drawn at random.")
     ] = None,
 ) -> None:
-    """Simulate machines that differ from their simulator, with other engines; needs `pip install axisight[blind]`."""
+    """Simulate machines that differ from their simulator, with other engines (extra `blind`)."""
     with errors(), bars() as progress:
         check_folder(cases)
         check_folder(truth)

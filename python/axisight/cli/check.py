@@ -92,7 +92,7 @@ def _fits(
         if not _told(finding, alone):
             say(f"{'refused' if finding.severity == 'refuse' else 'flagged'}: {finding}")
     if refused(beside.findings):
-        say(f"refused: axisight diagnose would not take this log with {model}")
+        say(f"a diagnosis with {model} would be refused")
         return False
     say(f"beside {model}: {beside.compared}")
     return True
