@@ -68,7 +68,7 @@ def montecarlo_command(
         design = design.changed(**{k: v for k, v in changes.items() if v is not None})
         if design.runs > _UNASKED and not yes:
             takes = estimate(design, threads or available_threads())
-            raise StudyError(f"runs: expected at most {_UNASKED} without --yes, got {takes}")
+            raise StudyError(f"runs: {takes}: pass --yes to run more than {_UNASKED}")
         with _bar() as progress:
             result = montecarlo.run(
                 design,
