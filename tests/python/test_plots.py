@@ -74,7 +74,9 @@ def test_without_causes_there_are_no_parameters():
 def test_unknown_log_or_axis_is_refused():
     with pytest.raises(InputError, match="log: expected one of"):
         axisight.plot_overlay(explained(), log="no such log")
-    with pytest.raises(InputError, match="axis: expected one of 1, 2, 3, got 9"):
+    with pytest.raises(
+        InputError, match=r"axis: expected 1 to 3 or a joint name \(axis1, axis2, axis3\), got 9"
+    ):
         axisight.plot_overlay(explained(), axis=9)
 
 

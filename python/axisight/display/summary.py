@@ -6,8 +6,9 @@ Numbers have four digits and their units, arrays their shape and range. Nothing 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from itertools import islice
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,6 +22,7 @@ _MOST_LINES = 24
 _MOST_NUMBERS = 6
 _MOST_WORDS = 4
 _LONGEST = 100
+_INSIDE = 60
 # Ends of names, longest first, and the unit that they say.
 _UNITS = (
     ("kg_m2", "kg m^2"),
@@ -63,16 +65,21 @@ def _text(self: object) -> str:
     title, rows = type(self).__name__, None
     if (own := getattr(self, "_summary", None)) is not None:
         title, rows = own()
-    elif _parameters(self) is None:
-        line = ", ".join(f"{key}={shortened(value, key)}" for key, value in _fields(self))
-        if len(line) < _LONGEST:
-            return f"{title}({line})"
+    elif _parameters(self) is None and (line := _line(self, _LONGEST)):
+        return line
     rows = _rows(self) if rows is None else rows
     more = len(rows) - _MOST_LINES
     width = max((len(name) for name, _ in rows), default=0)
     lines = [f"  {name:<{width}}  {value}".rstrip() for name, value in rows[:_MOST_LINES]]
     lines += [f"  and {more} more"] if more > 0 else []
     return "\n".join([title, *lines])
+
+
+def _line(thing: object, most: int) -> str:
+    """Return the fields in one line of at most ``most`` characters; nothing where that is too short."""
+    shown = ", ".join(f"{key}={shortened(value, key)}" for key, value in _fields(thing))
+    line = f"{type(thing).__name__}({shown})"
+    return line if len(line) <= most else ""
 
 
 def _html(self: object) -> str:
@@ -110,7 +117,11 @@ def _fields(thing: object) -> list[tuple[str, Any]]:
     if not is_dataclass(thing):
         return []
     shown = [(f.name, getattr(thing, f.name)) for f in fields(thing) if f.repr]
-    return [(key, value) for key, value in shown if value is not None]
+    return [(key, value) for key, value in shown if value is not None and not _is_empty_text(value)]
+
+
+def _is_empty_text(value: object) -> bool:
+    return isinstance(value, str) and not value
 
 
 def _parameters(thing: object) -> tuple[Sequence[str], Sequence[float], Sequence[float]] | None:
@@ -143,7 +154,7 @@ def _unit(name: str) -> str:
 
 def _is_numeric(value: object) -> bool:
     if isinstance(value, np.ndarray):
-        return value.dtype.kind in "fc"
+        return value.dtype.kind in "fc" and value.size > 0
     if isinstance(value, tuple | list):
         return bool(value) and all(_is_numeric(item) for item in value)
     return isinstance(value, float | np.floating)
@@ -165,10 +176,10 @@ def _worded(value: object) -> str:  # noqa: PLR0911 one line a kind
     if isinstance(shape := getattr(value, "shape", None), tuple) and len(shape) == 2:
         return f"{type(value).__name__} ({shape[0]} rows, {shape[1]} columns)"
     if isinstance(value, Mapping):
-        pairs = [f"{key}: {_item(item)}" for key, item in value.items()]
-        return _list(pairs) or "none"
+        some = islice(value.items(), _MOST_WORDS)
+        return _list([f"{key}: {_item(item)}" for key, item in some], len(value))
     if isinstance(value, tuple | list | set | frozenset):
-        return _list([_item(item) for item in value]) or "none"
+        return _list([_item(item) for item in islice(value, _MOST_WORDS)], len(value))
     return _item(value)
 
 
@@ -183,6 +194,8 @@ def _item(value: object) -> str:
     if "__str__" in own and "\n" not in (said := str(value)):
         return _cut(said)
     kind = type(value).__name__
+    if hasattr(type(value), "_repr_html_") and (line := _line(value, _INSIDE)):
+        return line
     return f"{kind} {_cut(named)}" if isinstance(named, str) and named else kind
 
 
@@ -210,11 +223,10 @@ def _array(value: np.ndarray[Any, Any]) -> str:
     return f"{shape} numbers, {what}{low} to {high}"
 
 
-def _list(texts: Iterable[str]) -> str:
-    found = list(texts)
-    shown = ", ".join(found[:_MOST_WORDS])
-    more = len(found) - _MOST_WORDS
-    return _cut(shown) + (f", and {more} more" if more > 0 else "")
+def _list(first: Sequence[str], count: int) -> str:
+    """Return the first of several texts, and how many more there are."""
+    more = f", and {count - len(first)} more" if count > len(first) else ""
+    return _cut(", ".join(first)) + more if first else "none"
 
 
 def _cut(text: str) -> str:

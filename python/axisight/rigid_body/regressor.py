@@ -33,6 +33,13 @@ class TorqueModel:
 
     """
 
+    def __repr__(self) -> str:
+        """Return robot, side and number of parameters."""
+        return (
+            f"<TorqueModel of {self.robot.name!r}: {self.side} side, {self.n_rows} torques, "
+            f"{len(self.names)} parameters>"
+        )
+
     def __init__(
         self,
         robot: Robot,

@@ -45,13 +45,13 @@ WRONG = {
     "diagnose --repor x": "--report)",
     "--versio": "--version)",
     "diagnose mycas": "Did you mean mycase?",
-    "diagnose run1.csv --model irb6600_lik": "Did you mean irb6600_like?",
+    "diagnose run1.csv --model irb6600_lik": "Did you mean 'irb6600_like'?",
     "diagnose run1.csv --model robt.toml": "Did you mean robot.toml?",
     "diagnose run1.csv --effect backlas@1": "Did you mean 'backlash'?",
-    "columns show ur-rtd": "Did you mean ur-rtde?",
+    "columns show ur-rtd": "Did you mean 'ur-rtde'?",
     "check run2.csv": "Did you mean run1.csv?",
-    "check run1.csv --columns map.toml": "Did you mean position_1?",
-    "check run1.csv --columns ur-rted": "Did you mean ur-rtde?",
+    "check run1.csv --columns map.toml": "Did you mean 'position_1'?",
+    "check run1.csv --columns ur-rted": "Did you mean 'ur-rtde'?",
     "check run1.csv --columns mop.toml": "Did you mean map.toml?",
     "excite --robot irb6600_like --kind multisin": "Did you mean multisine?",
     "robot import arn.urdf": "Did you mean arm.urdf?",
@@ -65,7 +65,7 @@ def test_what_was_meant_is_said_once(folder, typed):
     assert done.exit_code in (1, 2)
     said = " ".join(done.output.split())
     assert WRONG[typed] in said, said
-    assert said.lower().count("did you mean") <= 1
+    assert said.lower().count("Did you mean") <= 1
 
 
 def test_of_several_commands_or_options_the_nearest_is_said(folder):
@@ -78,7 +78,7 @@ def test_of_several_commands_or_options_the_nearest_is_said(folder):
 
 def test_nothing_is_said_where_nothing_is_near(folder):
     for typed in ("columns show zzz", "check zzz.csv", "diagnose zzz"):
-        assert "did you mean" not in CliRunner().invoke(app, typed.split()).output.lower()
+        assert "Did you mean" not in CliRunner().invoke(app, typed.split()).output.lower()
 
 
 @pytest.mark.parametrize(

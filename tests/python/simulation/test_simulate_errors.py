@@ -73,7 +73,7 @@ EFFECTS = {
     "negative axis": (("torque_ripple", -1, {}), r"torque_ripple.*axis.*-1"),
     "axis 4": (("torque_ripple", 4, {}), r"torque_ripple.*from 1 to 3.*4"),
     "no axis": (("torque_ripple", None, {}), r"torque_ripple.*no axis"),
-    "unknown": (("wobble", 1, {}), r"wobble.*expected one of"),
+    "unknown": (("wobble", 1, {}), r"unknown effect 'wobble'\. axisight\.effect_table"),
     "parameter": (("torque_ripple", 1, {"sine_nm": 1.0}), r"torque_ripple.*sine_nm.*sine_1_nm"),
 }
 

@@ -21,6 +21,7 @@ from axisight.gap.facts.axis_names import axis_label, verdict_word
 from axisight.gap.facts.compared_quantity import MOTION_HEAD, Compared, VelocityFrom, motion_words
 from axisight.gap.facts.experiment import Experiment
 from axisight.gap.facts.faults import Finding
+from axisight.gap.facts.shown import MOST, cause_in_words, cause_rows, percent
 from axisight.gap.facts.trace import Trace
 from axisight.robot.axis_names import axis_number
 from axisight.storage import write_whole
@@ -39,6 +40,10 @@ class Interval:
     value: float
     low: float
     high: float
+
+    def __str__(self) -> str:
+        """Return ``0.61 (0.58 to 0.64)``."""
+        return f"{self.value:.4g} ({self.low:.4g} to {self.high:.4g})"
 
 
 @summarized
@@ -123,6 +128,11 @@ class Gap:
     pooled: Pooled | None = None
     compared: Compared = "torques"
     motion: MotionErrors | None = None
+
+    @property
+    def stages(self) -> tuple[float, float, float, float]:
+        """Before, re-fitted, after and floor [1]."""
+        return self.before, self.refitted, self.after, self.floor
 
 
 @summarized
@@ -422,40 +432,28 @@ class Diagnosis:
 
     def _summary(self) -> tuple[str, list[tuple[str, str]]]:
         """Return a title and rows for the repr: verdict, gap, causes with values, axes."""
-        gap = self.gap
-        stages = (gap.before, gap.refitted, gap.after, gap.floor)
-        words = ("as given", "re-fitted", "with the causes", "noise alone")
-        rows = [("verdict", self.headline)]
-        rows.append(
-            ("gap", ", ".join(f"{_percent(x)} {w}" for x, w in zip(stages, words, strict=True)))
+        before, refitted, after, floor = map(percent, self.gap.stages)
+        gap = (
+            f"{before} as given, {refitted} re-fitted, {after} with the causes, {floor} noise alone"
         )
-        for cause in self.causes[:_SHOWN]:
-            values = [
-                f"{n} {html.number(p.value)} {cause.units.get(n, '')}".strip()
-                for n, p in cause.parameters.items()
-            ]
-            rows.append(
-                (cause.label, f"{100 * cause.probability:.0f} %: {', '.join(values[:_SHOWN])}")
-            )
-        if len(self.causes) > _SHOWN:
-            rows.append(("causes", f"and {len(self.causes) - _SHOWN} more"))
-        for number, verdict, row in self.axis_rows()[:_SHOWN]:
+        rows = [("verdict", self.headline), ("gap", gap)]
+        rows += [(cause.label, cause_in_words(cause)) for cause in self.causes[:MOST]]
+        rows += [("causes", f"{len(self.causes)} in all")] if len(self.causes) > MOST else []
+        for number, verdict, row in self.axis_rows()[:MOST]:
             name = f"axis {axis_label(number, self.joints)}"
-            rows.append((name, f"{verdict}: {_percent(row[0])} to {_percent(row[2])}".lstrip(": ")))
-        if self.next_experiment:
-            rows.append(("next", self.next_experiment))
+            rows.append((name, f"{verdict}: {percent(row[0])} to {percent(row[2])}".lstrip(": ")))
+        rows += [("next", self.next_experiment)] if self.next_experiment else []
         return f"Diagnosis {self.name!r}: {self.verdict}", rows
 
     def _repr_html_(self) -> str:
         """Verdict, causes with values, and the gap by axis, for notebooks."""
-        causes = [row for cause in self.causes for row in _rows(cause)]
+        causes = [row for cause in self.causes for row in cause_rows(cause)]
         gap, joints = self.gap, self.joints
         rows = [
-            (axis_label(i, joints), verdict, *map(_percent, row))
+            (axis_label(i, joints), verdict, *map(percent, row))
             for i, verdict, row in self.axis_rows()
         ]
-        whole = (gap.before, gap.refitted, gap.after, gap.floor)
-        rows.append(("all", self.verdict, *map(_percent, whole)))
+        rows.append(("all", self.verdict, *map(percent, gap.stages)))
         moved = [] if gap.motion is None else gap.motion.rows()
         then = [] if self.next_experiment is None else [f"next experiment: {self.next_experiment}"]
         return html.page(
@@ -523,29 +521,6 @@ class Diagnosis:
     def save_verdict(self, path: Path | str) -> None:
         """Write the verdict as JSON; the file appears whole or not at all."""
         write_whole(Path(path), self.to_json())
-
-
-# Causes, values and axes that a repr shows.
-_SHOWN = 7
-
-
-def _rows(cause: Cause) -> list[tuple[str, ...]]:
-    """Return a row for a cause, and one for each of its values."""
-    values = [
-        (
-            f"  {name}",
-            f"{html.number(p.value)} {unit}",
-            f"{html.number(p.low)} to {html.number(p.high)}",
-            "",
-        )
-        for name, p in cause.parameters.items()
-        for unit in (cause.units.get(name, "1"),)
-    ]
-    return [(cause.label, "", "", f"{cause.probability:.3f}"), *values]
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.3g} %" if math.isfinite(share) else "-"
 
 
 def _finite(value: Any) -> Any:
