@@ -65,15 +65,17 @@ def rest(session: Session, last: Answer, axis: int, tab: str, against: Against) 
     """Return what is shown once nothing moves; ``axis`` from 0."""
     held = session.held_gap(last.version)
     log, versions = session.logs[last.log], {"given": last.given, "now": last.now}
+    counted = session.view.counted(log)[:, 0]
     residuals = {key: seen.residual[:, axis] for key, seen in versions.items()}
     out = Rest(axis, held, session.held_given, session.held_floor)
     if tab == "against":
         x = quantity(log, axis, against)
         step = max(1, len(x) // _DOTS)
-        means = {key: in_bins(x, r)[:2] for key, r in residuals.items()}
-        return replace(out, against=((x[::step], residuals["now"][::step]), means))
+        shown = {key: np.where(counted > 0, r, np.nan) for key, r in residuals.items()}
+        means = {key: in_bins(x, r)[:2] for key, r in shown.items()}
+        return replace(out, against=((x[::step], shown["now"][::step]), means))
     if tab == "orders":
-        orders = {key: order_spectrum(log, axis, r) for key, r in residuals.items()}
+        orders = {key: order_spectrum(log, axis, counted * r) for key, r in residuals.items()}
         return replace(out, orders=orders)
     if tab == "responses":
         return _with_responses(session, last, out)

@@ -34,17 +34,17 @@ def prepared(
     given = (inputs.name, inputs.robot, inputs.estimation, inputs.validation)
     session = Session(*given, settings, inputs.simulated)
     progress("preparing the simulator", 1, 2)
-    # The curve everything is compared with.
-    session.see(0)
+    # The page opens where there is most to see; the curves there are ready.
+    log, axis = session.largest_gap()
     progress("preparing the simulator", 2, 2)
     # One thread is left to the sliders; threads change no result.
     fewer = replace(settings, threads=max(1, settings.threads - 1))
     work = Background(*given, fewer, inputs.simulated)
-    return State(session, work, said)
+    return State(session, work, said, log, axis)
 
 
 def served(state: State, port: int = 0) -> Served:
     """Return the running page of a state; raises InputError for a port in use."""
     # In line with what the server gives: nothing from elsewhere.
     pn.extension(design="native", inline=True)
-    return serve(lambda: Page(state).view(), port)
+    return serve(lambda: Page(state).view(), port, state.title())

@@ -38,12 +38,12 @@ class Controls:
         mode = state.session.view.mode
         self._offered = usable(state.session.robot, inverse_dynamics=mode == "inverse_dynamics")
         self._name = pn.widgets.Select(
-            name="cause", options={title(n): n for n in self._offered}, width=200
+            name="cause", options={title(n): n for n in self._offered}, width=190
         )
-        self._place = pn.widgets.Select(name="where", width=130)
+        self._place = pn.widgets.Select(name="where", width=115)
         self._name.param.watch(lambda _event: self._places(), "value")
         self._add = pn.widgets.Button(
-            name="add", width=45, align="end", margin=(5, 0), button_type="primary"
+            name="add", width=45, align="end", margin=(5, 10), button_type="primary"
         )
         self._add.on_click(lambda _event: self.add(usual(self._name.value, self._place.value)))
         self._places()

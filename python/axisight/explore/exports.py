@@ -8,9 +8,11 @@ from importlib.metadata import version
 from typing import Any
 
 import matplotlib.figure
+import numpy as np
 
 from axisight import palette
 from axisight.explore.session import Seen, Session, Version
+from axisight.gap.facts.axis_names import axis_label
 from axisight.gap.simulator.own_parameters import split
 from axisight.report.curves import thin
 from axisight.robot_file import Provenance, identified
@@ -44,7 +46,7 @@ _POINTS = 4000
 
 def figure_png(session: Session, log: int, axis: int, given: Seen, seen: Seen, unit: str) -> bytes:
     """Return a figure of one log and axis (from 0): torque above, residual below."""
-    time = session.logs[log].time_s
+    time, counts = session.logs[log].time_s, session.counts(log)
     figure = matplotlib.figure.Figure(figsize=(10, 6), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True)
     curves = (
@@ -55,13 +57,15 @@ def figure_png(session: Session, log: int, axis: int, given: Seen, seen: Seen, u
         (below, seen.residual, palette.AFTER, f"with the causes, gap {seen.gap[axis]:.1%}"),
     )
     for panel, values, color, label in curves:
-        t, v = thin(time, values[:, axis], _POINTS)
+        t, v = thin(time, np.where(counts, values[:, axis], np.nan), _POINTS)
         panel.plot(t, v, color=color, lw=0.8, label=label)
     # Names are other people's: a dollar sign in one would be read as a formula.
     name = session.logs[log].name
-    above.set_title(f"{name}, axis {axis + 1}", parse_math=False)
+    label = axis_label(axis + 1, session.robot.axis_names)
+    title = f"{session.robot.name}, {name}, axis {label}\n{session.filter_words}"
+    above.set_title(title, parse_math=False, fontsize="medium")
     above.set_ylabel(f"torque [{unit}]")
-    below.set_ylabel(f"residual [{unit}]")
+    below.set_ylabel(f"simulated less measured [{unit}]")
     below.set_xlabel("time [s]")
     for panel in (above, below):
         panel.legend(loc="upper right", fontsize="small")

@@ -22,6 +22,7 @@ from axisight.explore.exports import figure_png, robot_text, verdict_text
 from axisight.explore.plots import Orders, Regard, Responses, time_figures
 from axisight.explore.regard import AGAINST
 from axisight.explore.state import PINS, State
+from axisight.gap.facts.axis_names import axis_label
 from axisight.gap.facts.compared_quantity import torque_of
 
 Array = NDArray[np.float64]
@@ -29,7 +30,15 @@ Array = NDArray[np.float64]
 # What is slow waits until a slider has rested so long.
 _REST_MS = 250
 _POLL_MS = 300
-_LEFT = 400
+# Beside one another where both fit, else below; nothing is wider than the screen.
+_LEFT = {"flex": "0 1 420px", "min-width": "min(100%, 300px)", "margin-right": "15px"}
+_RIGHT = {"flex": "1 1 480px", "min-width": "min(100%, 320px)"}
+
+_LABELS = {"given": "as given", "now": "as chosen"} | {p: f"pin {p}" for p in PINS}
+_MODES = {
+    "closed_loop": "Closed loop: robot and controller are simulated together, from the logged references.",
+    "inverse_dynamics": "Inverse dynamics: the torque is computed from the measured motion.",
+}
 
 _TABS = ("time", "against", "orders", "bands", "responses")
 
@@ -50,6 +59,8 @@ class Page:
     def __init__(self, state: State) -> None:
         self.state = state
         session = state.session
+        names = session.robot.axis_names
+        self._labels = [axis_label(i + 1, names) for i in range(session.n_axes)]
         kind = session.robot.axis_is_prismatic
         self._units = [("N", "m") if prismatic else ("Nm", "rad") for prismatic in kind]
         self._busy = self._wanted = False
@@ -61,7 +72,8 @@ class Page:
         self._curves = time_figures(self._time)
         self._curves["torque"].figure.on_event(RangesUpdate, lambda _event: self._zoomed())
         self._regard, self._orders = Regard(), Orders()
-        self._responses = Responses(session.n_axes)
+        self._responses = Responses(session.n_axes, session.robot.axis_names)
+        self._head = self._html("")
         self._bands = self._html("")
         self._gaps, self._held, self._message = self._html(""), self._html(""), self._html("")
         self._pinned = self._html("")
@@ -95,9 +107,9 @@ class Page:
             f"{i + 1}. {log.name} ({role})": i
             for i, (log, role) in enumerate(zip(session.logs, session.roles, strict=True))
         }
-        axes = {f"axis {i + 1}": i for i in range(session.n_axes)}
-        self._log = pn.widgets.Select(name="log", options=logs, value=state.log, width=250)
-        self._axis = pn.widgets.Select(name="axis", options=axes, value=state.axis, width=110)
+        axes = {f"axis {label}": i for i, label in enumerate(self._labels)}
+        self._log = pn.widgets.Select(name="log", options=logs, value=state.log, width=220)
+        self._axis = pn.widgets.Select(name="axis", options=axes, value=state.axis, width=130)
         self._log.param.watch(self._other_log, "value")
         self._axis.param.watch(self._other_axis, "value")
         self._against = pn.widgets.Select(
@@ -134,7 +146,7 @@ class Page:
 
     def _verdict(self) -> bytes:
         if self.state.said is None:
-            raise AxisightError("no verdict yet: run the diagnosis, or start with --verdict")
+            raise AxisightError("No verdict yet: run the diagnosis, or start with --verdict FILE.")
         return verdict_text(self.state.said.document).encode()
 
     def _figure(self) -> bytes:
@@ -171,11 +183,17 @@ class Page:
         self._run = pn.widgets.Button(name="run the diagnosis", width=170, button_type="primary")
         self._stop = pn.widgets.Button(name="stop", width=80, disabled=True)
         self._says = self._html("")
-        self._bar = pn.indicators.Progress(value=0, max=100, width=360, visible=False)
+        self._bar = pn.indicators.Progress(
+            value=0, max=100, sizing_mode="stretch_width", max_width=360, visible=False
+        )
         self._run.on_click(lambda _event: self._begin())
         self._stop.on_click(lambda _event: self.state.background.stop())
-        self._refitted = pn.widgets.Checkbox(
-            name="with the parameters it re-fitted", value=self.state.refitted
+        # A list, not a box to tick: screen readers find no name beside a box here.
+        self._refitted = pn.widgets.Select(
+            name="own parameters",
+            options={"as given": False, "re-fitted": True},
+            value=self.state.refitted,
+            width=200,
         )
         self._refitted.param.watch(self._refit, "value")
         self._polls: Any = None
@@ -198,7 +216,7 @@ class Page:
         work = self.state.background
         self._run.disabled, self._stop.disabled = work.busy, not work.busy
         kind = "problem" if work.state == "failed" else "quiet"
-        self._says.object = words.text(f"{work.state}: {work.says}", kind)
+        self._says.object = words.text(": ".join(filter(None, (work.state, work.says))), kind)
         self._bar.visible, self._bar.value = work.busy, int(100 * work.share)
         if work.busy:
             return
@@ -211,18 +229,22 @@ class Page:
 
     def _show_said(self) -> None:
         said = self.state.said
+        title = self.state.title()
+        self._head.object = words.heading(title, 1) + self._compared()
+        if self._doc is not None:
+            self._doc.title = title
         self._refitted.visible = said is not None
         self._downloads[1].disabled = said is None
         if said is None:
-            self._said.objects = [self._html(words.text("nothing yet", "quiet"))]
+            self._said.objects = [self._html(words.text("Not run yet.", "quiet"))]
             return
-        rows: list[Any] = [self._html(words.of_verdict(said))]
+        rows: list[Any] = [self._html(words.of_verdict(said, self._labels))]
         for cause in said.causes:
             button = pn.widgets.Button(name="add the cause", width=120, margin=(5, 5))
             button.on_click(partial(self._add_said, cause.effect))
-            rows.append(pn.Row(self._html(words.of_cause(cause)), button))
+            rows.append(pn.Column(self._html(words.of_cause(cause)), button))
         if not said.causes:
-            rows.append(self._html(words.text("it names no cause", "quiet")))
+            rows.append(self._html(words.text("It names no cause.", "quiet")))
         self._said.objects = rows
 
     def _add_said(self, effect: Any, _event: Any) -> None:
@@ -293,7 +315,8 @@ class Page:
         log = session.logs[found.log]
         torque, angle = self._units[axis]
         versions = {"given": found.given, "now": found.now, **found.pins}
-        self._curves["torque"].show("measured", log.time_s, found.now.measured, axis)
+        counts = session.counts(found.log)
+        self._curves["torque"].show("measured", log.time_s, found.now.measured, axis, counts)
         self._curves["position"].show("measured", log.time_s, log.position_rad, axis)
         for key in ("given", "now", *PINS):
             seen = versions.get(key)
@@ -301,44 +324,44 @@ class Page:
             if seen is not None:
                 shown = (seen.simulated, seen.residual, seen.position_rad)
             for name, values in zip(("torque", "residual", "position"), shown, strict=True):
-                self._curves[name].show(key, log.time_s, values, axis)
+                # Motions are known at the ends of a log, too.
+                shows = None if name == "position" else counts
+                self._curves[name].show(key, log.time_s, values, axis, shows)
         for name, label in (
             ("torque", f"torque [{torque}]"),
-            ("residual", f"residual [{torque}]"),
+            ("residual", f"sim. − measured [{torque}]"),
             ("position", f"position [{angle}]"),
         ):
             self._curves[name].figure.yaxis.axis_label = label
-        self._gaps.object = words.heading(f"Gap on {log.name}") + self._gap_table(versions)
+        self._gaps.object = words.heading(f"Gap on {log.name}") + self._gap_table(versions, log.name)
         self._bands.object = self._band_table(versions)
         self._pinned.object = "".join(
             words.text(f"{pin}: {self.state.said_of(made)}", "quiet")
             for pin, made in sorted(self.state.pins.items())
         )
         if found.now.broken_at_s is not None:
-            self._say(f"the simulation breaks off at {found.now.broken_at_s:.2f} s")
+            self._say(f"The simulation breaks off at {found.now.broken_at_s:.2f} s.")
         else:
             self._say("")
 
-    def _gap_table(self, versions: dict[str, Any]) -> str:
-        labels = {"given": "as given", "now": "as chosen"} | {p: f"pin {p}" for p in PINS}
-        head = ("axis", *(labels[k] for k in versions))
+    def _gap_table(self, versions: dict[str, Any], log: str) -> str:
+        head = ("axis", *(_LABELS[k] for k in versions))
         rows = [
-            (str(i + 1), *(words.share(v.gap[i]) for v in versions.values()))
-            for i in range(self.state.session.n_axes)
+            (label, *(words.share(v.gap[i]) for v in versions.values()))
+            for i, label in enumerate(self._labels)
         ]
-        return words.table(head, rows, "gaps")
+        return words.table(head, rows, "gaps", f"Gap on log {log}, by axis", unseen=True)
 
     def _band_table(self, versions: dict[str, Any]) -> str:
-        labels = {"given": "as given", "now": "as chosen"} | {p: f"pin {p}" for p in PINS}
         session = self.state.session
-        out = ""
-        for i in range(session.n_axes):
-            head = (f"axis {i + 1}, Hz", *(labels[k] for k in versions))
+        out = words.text(words.BANDS, "quiet")
+        for i, label in enumerate(self._labels):
+            head = ("Hz", *(_LABELS[k] for k in versions))
             rows = [
                 (f"{low:g} to {high:g}", *(words.share(v.bands[i, b]) for v in versions.values()))
                 for b, (low, high) in enumerate(session.bands)
             ]
-            out += words.table(head, rows, f"bands-{i + 1}")
+            out += words.table(head, rows, f"bands-{i + 1}", f"Axis {label}")
         return out
 
     def _rested(self, found: Rest | Exception) -> None:
@@ -346,31 +369,33 @@ class Page:
             self._say(_told(found))
             return
         self._held.object = words.heading("Gap on all validation logs") + words.table(
-            ("axis", "as given", "as chosen", "noise"),
+            ("axis", "as given", "as chosen", "floor"),
             [
-                (str(i), *map(words.share, row))
-                for i, row in enumerate(
-                    zip(found.held_given, found.held, found.held_floor, strict=True), 1
+                (label, *map(words.share, row))
+                for label, *row in zip(
+                    self._labels, found.held_given, found.held, found.held_floor, strict=True
                 )
             ],
             "held",
+            "Gap on all validation logs, by axis",
+            unseen=True,
         )
         unit, angle = self._units[found.axis]
         if found.against is not None:
             dots, means = found.against
             self._regard.dots.data = {"x": dots[0], "y": dots[1]}
             for key, (x, y) in means.items():
-                self._regard.means[key].data = {"x": x, "y": y}
+                self._regard.show(key, x, y)
             label = {"speed": f"{angle}/s", "angle": angle, "load": unit, "time": "s"}
             chosen = self._against.value
             self._regard.figure.xaxis.axis_label = f"{AGAINST[chosen]} [{label[chosen]}]"
-            self._regard.figure.yaxis.axis_label = f"residual [{unit}]"
+            self._regard.figure.yaxis.axis_label = f"simulated − measured [{unit}]"
         for key, (orders, amplitude) in found.orders.items():
             self._orders.show(key, orders, amplitude)
         self._orders.figure.yaxis.axis_label = f"amplitude in the residual [{unit}]"
         self._responses.of(found.axis)
-        for key, (frequency, gain) in found.responses.items():
-            self._responses.show(key, frequency, gain)
+        if found.responses:
+            self._responses.show(found.responses)
         if found.problem:
             self._say(found.problem)
 
@@ -379,6 +404,7 @@ class Page:
     def _build_tabs(self) -> Any:
         panes = {
             "time": pn.Column(
+                self._html(words.text(f"{words.TIME} {self.state.session.filter_words}", "quiet")),
                 *(
                     pn.pane.Bokeh(c.figure, sizing_mode="stretch_width")
                     for c in self._curves.values()
@@ -386,16 +412,19 @@ class Page:
                 sizing_mode="stretch_width",
             ),
             "residual against": pn.Column(
+                self._html(words.text(words.AGAINST, "quiet")),
                 self._against,
                 pn.pane.Bokeh(self._regard.figure, sizing_mode="stretch_width"),
                 sizing_mode="stretch_width",
             ),
             "orders": pn.Column(
+                self._html(words.text(words.ORDERS, "quiet")),
                 pn.pane.Bokeh(self._orders.figure, sizing_mode="stretch_width"),
                 sizing_mode="stretch_width",
             ),
             "bands": self._bands,
             "response": pn.Column(
+                self._html(words.text(words.RESPONSE, "quiet")),
                 pn.pane.Bokeh(self._responses.figure, sizing_mode="stretch_width"),
                 sizing_mode="stretch_width",
             ),
@@ -407,38 +436,37 @@ class Page:
     def view(self) -> Any:
         """Return the page."""
         left = pn.Column(
-            pn.Row(self._log, self._axis),
+            pn.FlexBox(self._log, self._axis),
             self._gaps,
             self._held,
             self._message,
-            self._html(words.heading("Causes")),
+            self._html(words.heading("Causes put in by hand")),
             self._controls.view(),
-            self._html(words.heading("What the diagnosis said")),
+            self._html(words.heading("Diagnosis")),
             pn.Row(self._run, self._stop),
             self._says,
             self._bar,
             self._said,
             self._refitted,
-            self._html(words.heading("Compare")),
-            pn.Row(*self._pins, self._unpin),
+            self._html(words.heading("Compare simulators")),
+            pn.FlexBox(*self._pins, self._unpin),
             self._pinned,
             self._html(words.heading("Export")),
-            pn.Row(*self._downloads),
-            width=_LEFT,
-            margin=(0, 15, 0, 0),
+            pn.FlexBox(*self._downloads),
+            styles=_LEFT,
         )
-        name = self._html(
-            words.heading(self.state.session.name) + words.text(self._compared(), "quiet")
-        )
+        self._tabs.styles = _RIGHT
         return pn.Column(
-            name,
-            pn.Row(left, self._tabs, sizing_mode="stretch_width"),
+            self._head,
+            pn.FlexBox(left, self._tabs, sizing_mode="stretch_width"),
             sizing_mode="stretch_width",
             margin=10,
         )
 
     def _compared(self) -> str:
-        view = self.state.session.view
-        how = {"closed_loop": "closed loop", "inverse_dynamics": "inverse dynamics"}[view.mode]
-        cutoff = "" if view.cutoff_hz is None else f", below {view.cutoff_hz:.3g} Hz"
-        return f"{how}{cutoff}; gap is the rms of the residual over the deviation of the {torque_of(view.compared)}"
+        session = self.state.session
+        how = _MODES[session.view.mode]
+        gap = f"{words.GAP} {torque_of(session.view.compared)}."
+        robot, case = session.robot.name, session.name
+        named = "" if case in (robot, "") else words.text(f"Case {case}", "quiet")
+        return named + words.text(f"{how} {session.filter_words} {gap}", "quiet")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool, Legend, LegendItem, Range1d
@@ -10,6 +11,7 @@ from bokeh.plotting import figure
 from numpy.typing import NDArray
 
 from axisight import palette
+from axisight.gap.facts.axis_names import axis_label
 
 Array = NDArray[np.float64]
 
@@ -56,23 +58,23 @@ class Curves:
             line = self.figure.line("x", "y", source=source, color=color, line_dash=dash)
             self.sources[key] = source
             self._items[key] = LegendItem(label=label, renderers=[line])
-        legend = Legend(
-            items=list(self._items.values()),
-            orientation="horizontal",
-            click_policy="hide",
-            border_line_color=None,
-            margin=0,
-            padding=2,
-            spacing=12,
-            label_text_font_size="9pt",
-        )
-        self.figure.add_layout(legend, "above")
+        self.figure.add_layout(_legend(list(self._items.values())), "above")
         self.figure.add_tools(
             HoverTool(tooltips=[("time", "@x{0.000} s"), ("value", "@y")], mode="mouse")
         )
 
-    def show(self, key: str, time_s: Array, values: Array | None, axis: int) -> None:
-        """Show a column, of an axis from 0, of values (n, n_axes), or none; not again if it is there."""
+    def show(
+        self,
+        key: str,
+        time_s: Array,
+        values: Array | None,
+        axis: int,
+        counts: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Show a column, of an axis from 0, of values (n, n_axes), or none; not again if it is there.
+
+        ``counts`` (n,): samples that are drawn; by default all.
+        """
         there = self._of.get(key)
         if there is not None and there[0] is values and there[1] == axis:
             return
@@ -80,7 +82,8 @@ class Curves:
         if values is None:
             self._full.pop(key, None)
         else:
-            self._full[key] = (time_s, values[:, axis])
+            column = values[:, axis]
+            self._full[key] = (time_s, column if counts is None else np.where(counts, column, np.nan))
         self.draw([key])
 
     def draw(self, keys: Sequence[str] | None = None) -> None:
@@ -147,16 +150,20 @@ class Regard:
         self.figure.scatter(
             "x", "y", source=self.dots, size=2, alpha=0.25, color=palette.AFTER, line_color=None
         )
-        self.means = {}
+        self.means, items = {}, []
         for key in ("given", "now"):
             label, color, _ = CURVES[key]
             source = ColumnDataSource({"x": [], "y": []}, name=f"against-{key}")
-            self.figure.line(
-                "x", "y", source=source, color=color, line_width=2.5, legend_label=f"mean, {label}"
-            )
+            line = self.figure.line("x", "y", source=source, color=color, line_width=2.5)
             self.means[key] = source
-        self.figure.legend.location = "top_right"
-        self.figure.legend.label_text_font_size = "9pt"
+            items.append(LegendItem(label=f"mean, {label}", renderers=[line]))
+        self._items = dict(zip(self.means, items, strict=True))
+        self.figure.add_layout(_legend(items), "above")
+
+    def show(self, key: str, x: Array, y: Array) -> None:
+        """Show the means of a version (n_bins,)."""
+        self.means[key].data = {"x": x, "y": y}
+        self._items[key].visible = len(x) > 0
 
 
 class Orders:
@@ -165,58 +172,110 @@ class Orders:
     def __init__(self) -> None:
         self.figure = _plain("figure-orders", "order of the motor angle", "amplitude")
         self.sources = {}
+        self._items = {}
         for key, shift in (("given", -0.2), ("now", 0.2)):
             label, color, _ = CURVES[key]
             source = ColumnDataSource({"x": [], "y": []}, name=f"orders-{key}")
-            self.figure.vbar(
-                "x", top="y", width=0.38, source=source, color=color, legend_label=label
-            )
+            bars = self.figure.vbar("x", top="y", width=0.38, source=source, color=color)
             self.sources[key] = (source, shift)
+            self._items[key] = LegendItem(label=label, renderers=[bars])
         self.figure.y_range.start = 0
-        self.figure.legend.label_text_font_size = "9pt"
+        self.figure.add_layout(_legend(list(self._items.values())), "above")
 
     def show(self, key: str, orders: Array, amplitude: Array) -> None:
         """Show the amplitudes (n_orders,) that are known."""
         source, shift = self.sources[key]
         known = np.isfinite(amplitude)
         source.data = {"x": orders[known] + shift, "y": amplitude[known]}
+        self._items[key].visible = bool(known.any())
+
+
+# Of the largest gain of a figure [1]. What is smaller no sensor resolves, and what 16 digits leave of an axis that
+# does not move is rounding: a curve of it would only stretch the scale.
+_ROUNDING = 1e-12
 
 
 class Responses:
-    """Gain from the torque of one motor to the angles of all."""
+    """Gain from the torque of one motor to the angles of all.
 
-    def __init__(self, n_axes: int) -> None:
-        self.figure = _plain("figure-responses", "frequency [Hz]", "gain [dB]", "log")
+    Axes by colour, versions by the kind of line: a legend of both has an entry for each that is drawn.
+    """
+
+    def __init__(self, n_axes: int, names: Sequence[str] = ()) -> None:
+        self.figure = _plain("figure-responses", "frequency [Hz]", "gain [dB re 1 rad/Nm]", "log")
         self.sources: dict[str, list[ColumnDataSource]] = {"given": [], "now": [], "measured": []}
-        items = []
+        lines: dict[str, list[Any]] = {key: [] for key in self.sources}
         for i in range(n_axes):
             color = palette.SERIES[i % len(palette.SERIES)]
-            for key, dash in (("given", "dashed"), ("now", "solid")):
+            for key, seen in self.sources.items():
                 source = ColumnDataSource({"x": [], "y": []}, name=f"response-{key}-{i + 1}")
-                line = self.figure.line(
-                    "x", "y", source=source, color=color, line_dash=dash, line_width=1.6
-                )
-                self.sources[key].append(source)
-                items.append(LegendItem(label=f"axis {i + 1}, {CURVES[key][0]}", renderers=[line]))
-            dots = ColumnDataSource({"x": [], "y": []}, name=f"response-measured-{i + 1}")
-            seen = self.figure.scatter(
-                "x", "y", source=dots, size=4, color=color, alpha=0.6, line_color=None
+                seen.append(source)
+                lines[key].append(self._drawn(key, source, color))
+        self._axes = [
+            LegendItem(label=f"axis {axis_label(i + 1, names)}", renderers=[*of])
+            for i, of in enumerate(zip(lines["now"], lines["given"], lines["measured"], strict=True))
+        ]
+        self._kinds = {
+            key: LegendItem(label=CURVES[key][0], renderers=of) for key, of in lines.items()
+        }
+        self.figure.add_layout(_legend([*self._axes, *self._kinds.values()]), "above")
+        for item in (*self._axes, *self._kinds.values()):
+            item.visible = False
+
+    def _drawn(self, key: str, source: ColumnDataSource, color: str) -> Any:
+        if key == "measured":
+            return self.figure.scatter(
+                "x", "y", source=source, size=4, color=color, alpha=0.6, line_color=None
             )
-            self.sources["measured"].append(dots)
-            items.append(LegendItem(label=f"axis {i + 1}, measured", renderers=[seen]))
-        legend = Legend(items=items, click_policy="hide", label_text_font_size="9pt")
-        self.figure.add_layout(legend, "right")
+        dash = "dashed" if key == "given" else "solid"
+        return self.figure.line(
+            "x", "y", source=source, color=color, line_dash=dash, line_width=1.6
+        )
 
     def of(self, axis: int) -> None:
         """Say whose torque it is, of an axis from 0."""
-        self.figure.title.text = f"motor angles per torque of motor {axis + 1}"
+        self.figure.title.text = f"Angle of each motor per torque of motor {axis + 1}"
 
-    def show(self, key: str, frequency_hz: Array, gain: Array) -> None:
-        """Show gains (n_freq, n_outputs) [rad/Nm], those that are known."""
-        with np.errstate(divide="ignore"):
-            level = 20 * np.log10(gain)
-        for source, column in zip(self.sources[key], level.T, strict=True):
-            source.data = {"x": frequency_hz, "y": column}
+    def show(self, curves: Mapping[str, tuple[Array, Array]]) -> None:
+        """Show frequencies [Hz] (n_freq,) and gains (n_freq, n_outputs) [rad/Nm] by version, those that are known."""
+        for key, sources in self.sources.items():
+            frequency_hz, gain = curves.get(key, (np.zeros(0), np.zeros((0, len(sources)))))
+            for source, column in zip(sources, levels(gain).T, strict=True):
+                source.data = {"x": frequency_hz, "y": column}
+            self._kinds[key].visible = any(_seen(source) for source in sources)
+        for i, item in enumerate(self._axes):
+            item.visible = any(_seen(sources[i]) for sources in self.sources.values())
+
+
+def levels(gain: Array) -> Array:
+    """Return gains (n_freq, n_outputs) in dB; NaN where one is unknown, or rounding beside the largest."""
+    if gain.size == 0:
+        return gain
+    largest = np.max(np.where(np.isfinite(gain), gain, 0.0))
+    known = np.where(gain > _ROUNDING * largest, gain, np.nan)
+    return np.asarray(20 * np.log10(known))
+
+
+def _seen(source: ColumnDataSource) -> bool:
+    return bool(np.isfinite(np.asarray(source.data["y"], dtype=float)).any())
+
+
+# Columns of a legend above a figure, as many as a phone has room for.
+_LEGEND_COLUMNS = 3
+
+
+def _legend(items: Sequence[LegendItem]) -> Legend:
+    return Legend(
+        items=list(items),
+        ncols=_LEGEND_COLUMNS,
+        orientation="horizontal",
+        click_policy="hide",
+        border_line_color=None,
+        margin=0,
+        padding=2,
+        spacing=8,
+        label_text_font_size="9pt",
+    )
 
 
 def _plain(name: str, x_label: str, y_label: str, x_scale: str = "linear") -> figure:

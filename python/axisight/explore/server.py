@@ -48,10 +48,10 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def serve(page: Callable[[], Any], port: int = 0) -> Served:
+def serve(page: Callable[[], Any], port: int = 0, title: str = "Axisight explorer") -> Served:
     """Return the server of a page, not yet at work; ``page`` makes it anew for every visit.
 
-    ``port`` 0 takes a free one. Raises InputError for a port that is in use.
+    ``title``: of the page until it gives itself one. ``port`` 0 takes a free one. Raises InputError for a port that is in use.
     """
     chosen = port or free_port()
     host = f"{ADDRESS}:{chosen}"
@@ -63,7 +63,7 @@ def serve(page: Callable[[], Any], port: int = 0) -> Served:
             port=chosen,
             address=ADDRESS,
             websocket_origin=[host],
-            title="Axisight explorer",
+            title=title,
             start=False,
             show=False,
             index=None,

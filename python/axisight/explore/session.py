@@ -24,6 +24,7 @@ from axisight.gap.prepare.currents import unknown_axes
 from axisight.gap.simulator.own_parameters import nominal_values, with_values
 from axisight.gap.views.view import View
 from axisight.logs import Log
+from axisight.report.wording import filter_words
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -111,12 +112,36 @@ class Session:
         self.roles = ("estimation",) * len(estimation) + ("validation",) * len(validation)
         self._held = list(inputs.validation)
         self._measured: dict[int, Array] = {}
+        self._counts: dict[int, NDArray[np.bool_]] = {}
         self._seen: Callable[[int, Version], Seen] = lru_cache(_KEPT)(self._simulate)
 
     @property
     def n_axes(self) -> int:
         """Number of driven axes."""
         return self.robot.n_axes
+
+    def largest_gap(self) -> tuple[int, int]:
+        """Return the validation log and the axis, numbers from 0, where the gap as given is largest.
+
+        The axis by what its gap has above the floor, over all validation logs. A simulation that broke off
+        is the largest gap there is.
+        """
+        above = self.held_given**2 - self.held_floor**2
+        axis = int(np.argmax(np.nan_to_num(above, nan=np.inf)))
+        first = len(self.logs) - len(self._held)
+        gaps = [self.see(first + i).gap[axis] for i in range(len(self._held))]
+        return first + int(np.argmax(np.nan_to_num(gaps, nan=np.inf))), axis
+
+    def counts(self, log: int) -> NDArray[np.bool_]:
+        """Return which samples of a log, by number, count in the gap (n,): not those that a filter invents."""
+        if log not in self._counts:
+            self._counts[log] = self.view.counted(self.logs[log])[:, 0] > 0
+        return self._counts[log]
+
+    @property
+    def filter_words(self) -> str:
+        """Which filter measured and simulated torque passed."""
+        return filter_words(self.view.compared, self.view.lowpass_hz)
 
     @property
     def bands(self) -> list[tuple[float, float]]:

@@ -38,6 +38,11 @@ class State:
         if self.said is not None:
             self.hear(self.said.document)
 
+    def title(self) -> str:
+        """Return robot and verdict."""
+        robot = self.session.robot.name or self.session.name
+        return f"{robot}: {'no verdict yet' if self.said is None else self.said.verdict}"
+
     def version(self) -> Version:
         """Return the simulator as it is chosen."""
         labels = {e.label for e in self.chosen}

@@ -51,13 +51,17 @@ def running(case, found):
 def test_causes_by_hand(running):
     with visit(running.url) as seen:
         page = seen.page
+        # It opens where the gap is largest, and says whose it is.
+        assert page.title() == "irb6600-like, 250 kg payload, 20 states: explained"
+        chosen = "e => e.selectedOptions[0].text"
+        assert page.get_by_label("axis", exact=True).evaluate(chosen) == "axis 2"
         # The token has served: it stays in no history.
         assert page.url == f"{running.origin}/explore"
         seen.choose("log", "4. multisine_fresh (validation)")
         seen.choose("axis", "axis 2")
         seen.choose("cause", "Coulomb friction")
         seen.choose("where", "axis 2")
-        page.wait_for_selector("h3:has-text('Gap on multisine_fresh')")
+        page.wait_for_selector("h2:has-text('Gap on multisine_fresh')")
         given = seen.cell("gaps", 2, "as given").inner_text()
         expect(seen.cell("gaps", 2, "as chosen")).to_have_text(given)
         seen.click("add")
@@ -83,7 +87,7 @@ def test_what_the_diagnosis_said(running, found, tmp_path):
         page = seen.page
         assert found.headline in page.locator("p.said").inner_text()
         seen.click("add the cause")
-        page.locator("input[type=checkbox]").check()
+        seen.choose("own parameters", "re-fitted")
         for axis in (1, 2, 3):
             after = seen.cell("said-gaps", axis, "after").inner_text()
             expect(seen.cell("held", axis, "as chosen")).to_have_text(after)
@@ -99,7 +103,7 @@ def test_what_the_diagnosis_said(running, found, tmp_path):
         expect(page.get_by_role("button", name="take it out")).to_have_count(1)
         after = seen.cell("said-gaps", 2, "after").inner_text()
         expect(seen.cell("held", 2, "as chosen")).to_have_text(after)
-        page.locator("input[type=checkbox]").uncheck()
+        seen.choose("own parameters", "as given")
         seen.click("take it out")
         # Choices outlive a visit: one that ends before the server has heard leaves them to the next.
         expect(page.get_by_role("button", name="take it out")).to_have_count(0)
@@ -178,7 +182,7 @@ def test_without_references_the_torque_is_predicted_from_the_motion(case, tmp_pa
         pq.write_table(table.select(kept), path)
     with explorer(bare) as served, visit(served.url) as seen:
         page = seen.page
-        expect(page.get_by_text(re.compile(r"^inverse dynamics, below \d+"))).to_be_visible()
+        expect(page.get_by_text(re.compile(r"^Inverse dynamics: .* low-pass of [\d.]+ Hz"))).to_be_visible()
         seen.choose("axis", "axis 2")
         seen.choose("cause", "Coulomb friction")
         seen.choose("where", "axis 2")
@@ -189,6 +193,9 @@ def test_without_references_the_torque_is_predicted_from_the_motion(case, tmp_pa
         assert len(page.evaluate(DATA, "position-now")[0]) == 0
         page.get_by_text("response", exact=True).click()
         page.wait_for_function(f"() => ({DATA})('response-now-2')[0].length == 300")
+        # What changes no torque computed from the measured motion is not offered.
+        offered = page.get_by_label("cause", exact=True).locator("option").all_inner_texts()
+        assert "Input delay" not in offered and "Viscous friction" in offered
         assert len(page.evaluate(DATA, "response-measured-2")[0]) == 0
         assert seen.wrong == []
 
@@ -196,12 +203,12 @@ def test_without_references_the_torque_is_predicted_from_the_motion(case, tmp_pa
 def test_diagnosis_beside_the_page_can_be_stopped_and_run(case, found):
     with explorer(case) as served, visit(served.url) as seen:
         page = seen.page
-        assert page.get_by_text("nothing yet").is_visible()
+        assert page.get_by_text("Not run yet.").is_visible()
         seen.click("run the diagnosis")
         expect(page.get_by_text(re.compile(r"^running: .*: \d+ of \d+"))).to_be_visible()
         seen.click("stop")
         # A fit ends its step first, which takes long where others have the processors.
-        stopped = page.get_by_text("stopped: stopped; nothing was kept")
+        stopped = page.get_by_text("stopped: nothing was kept")
         expect(stopped).to_be_visible(timeout=120_000)
         seen.click("run the diagnosis")
         expect(page.locator("p.said")).to_contain_text(found.headline, timeout=400_000)
@@ -265,7 +272,8 @@ def test_names_are_shown_and_not_run(case, found, tmp_path):
         explorer(other, "--verdict", tmp_path / "verdict.json") as served,
         visit(served.url) as seen,
     ):
-        assert seen.page.locator("h3.ax").first.inner_text() == bad
+        assert seen.page.get_by_text(f"Case {bad}", exact=True).is_visible()
+        assert seen.page.locator("h1.ax").inner_text().endswith(f": {bad}")
         assert bad in seen.page.locator("p.said").inner_text()
         assert bad in seen.page.get_by_label("log", exact=True).inner_text()
         assert seen.page.locator("img[src=x]").count() == 0

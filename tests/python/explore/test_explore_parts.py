@@ -242,11 +242,12 @@ def test_slider_changes_one_value(session):
 def test_names_are_escaped():
     bad = "<script>x</script>"
     found = said(verdict(headline=bad, verdict=bad))
-    pages = [text(bad), table((bad,), [(bad,)], bad), of_verdict(found)]
+    labels = [bad, bad, bad]
+    pages = [text(bad), table((bad,), [(bad,)], bad, bad), of_verdict(found, labels)]
     pages += [of_cause(c) for c in found.causes]
     for page in pages:
         assert "<script" not in page
-    assert "&lt;script&gt;" in of_verdict(found)
+    assert "&lt;script&gt;" in of_verdict(found, labels)
 
 
 class Turns:
