@@ -333,7 +333,9 @@ class Page:
             ("position", f"position [{angle}]"),
         ):
             self._curves[name].figure.yaxis.axis_label = label
-        self._gaps.object = words.heading(f"Gap on {log.name}") + self._gap_table(versions, log.name)
+        self._gaps.object = words.heading(f"Gap on {log.name}") + self._gap_table(
+            versions, log.name
+        )
         self._bands.object = self._band_table(versions)
         self._pinned.object = "".join(
             words.text(f"{pin}: {self.state.said_of(made)}", "quiet")

@@ -83,7 +83,10 @@ class Curves:
             self._full.pop(key, None)
         else:
             column = values[:, axis]
-            self._full[key] = (time_s, column if counts is None else np.where(counts, column, np.nan))
+            self._full[key] = (
+                time_s,
+                column if counts is None else np.where(counts, column, np.nan),
+            )
         self.draw([key])
 
     def draw(self, keys: Sequence[str] | None = None) -> None:
@@ -213,7 +216,9 @@ class Responses:
                 lines[key].append(self._drawn(key, source, color))
         self._axes = [
             LegendItem(label=f"axis {axis_label(i + 1, names)}", renderers=[*of])
-            for i, of in enumerate(zip(lines["now"], lines["given"], lines["measured"], strict=True))
+            for i, of in enumerate(
+                zip(lines["now"], lines["given"], lines["measured"], strict=True)
+            )
         ]
         self._kinds = {
             key: LegendItem(label=CURVES[key][0], renderers=of) for key, of in lines.items()

@@ -182,7 +182,9 @@ def test_without_references_the_torque_is_predicted_from_the_motion(case, tmp_pa
         pq.write_table(table.select(kept), path)
     with explorer(bare) as served, visit(served.url) as seen:
         page = seen.page
-        expect(page.get_by_text(re.compile(r"^Inverse dynamics: .* low-pass of [\d.]+ Hz"))).to_be_visible()
+        expect(
+            page.get_by_text(re.compile(r"^Inverse dynamics: .* low-pass of [\d.]+ Hz"))
+        ).to_be_visible()
         seen.choose("axis", "axis 2")
         seen.choose("cause", "Coulomb friction")
         seen.choose("where", "axis 2")

@@ -50,7 +50,9 @@ def test_tables_have_captions_and_heads_have_scope(verdict):
 
 
 def test_numbers_and_their_units_are_not_torn_apart():
-    page = re.sub(r"<style>.*?</style>|<script>.*?</script>", "", render_report(explained()), flags=re.S)
+    page = re.sub(
+        r"<style>.*?</style>|<script>.*?</script>", "", render_report(explained()), flags=re.S
+    )
     assert re.findall(r"\d (?:%|Nm|Hz)(?!\w)[^<]{0,20}<", page.replace("95 %", "")) == []
     assert unbroken("13.1 % of 5 Nm, 3 nights") == "13.1\xa0% of 5\xa0Nm, 3 nights"
 
@@ -78,7 +80,9 @@ def test_nothing_serious_is_found(tmp_path):
             for width in (1280, 400):
                 page.set_viewport_size({"width": width, "height": 900})
                 page.goto(path.as_uri())
-                page.evaluate("document.querySelectorAll('details').forEach(e => { e.open = true; })")
+                page.evaluate(
+                    "document.querySelectorAll('details').forEach(e => { e.open = true; })"
+                )
                 assert grave_findings(page) == []
                 assert page.evaluate("document.documentElement.scrollWidth") <= width
         browser.close()

@@ -167,7 +167,9 @@ def test_the_command_designs_what_is_to_show(tmp_path: Path):
     out = ["--next-experiment", str(tmp_path / "next"), "--torque-limit", "20"]
     alone = CliRunner().invoke(app, [*command, *asked])
     assert alone.exit_code == 2
-    assert "--to-show: expected --next-experiment FOLDER beside it" in " ".join(alone.output.split())
+    assert "--to-show: expected --next-experiment FOLDER beside it" in " ".join(
+        alone.output.split()
+    )
     done = CliRunner().invoke(app, [*command, *asked, *out])
     assert done.exit_code == 0, done.output
     says = (tmp_path / "next" / "experiment.txt").read_text("utf-8")
