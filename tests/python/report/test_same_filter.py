@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_computed_torque import arm
+from test_explore_modes import SAMPLE, logs_of
 
 from axisight import Settings, diagnose, plot_overlay
 from axisight.logs import lowpass
 from axisight.report import render_report
-from test_computed_torque import arm
-from test_explore_modes import SAMPLE, logs_of
 
 
 @pytest.fixture(scope="module", params=["inverse_dynamics", "positions"])
