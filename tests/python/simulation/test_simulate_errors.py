@@ -39,7 +39,7 @@ WRONG = {
 OPTIONS = {
     "method": ({"method": "euler"}, r"method: expected .*rodas4.*euler"),
     "method of linear": ({"method": "euler", "model": "linear"}, r"method: expected .*euler"),
-    "model": ({"model": "affine"}, r"model: expected nonlinear or linear, got affine"),
+    "model": ({"model": "affine"}, r"model: expected one of nonlinear, linear, got .affine"),
     "tolerance 0": ({"tolerance": 0.0}, r"tolerance: expected between 1e-14 and 1, got 0"),
     "tolerance 1": ({"tolerance": 1.0}, r"tolerance: expected between 1e-14 and 1, got 1"),
     "negative tolerance": ({"tolerance": -1e-6}, r"tolerance: .*-0.000001"),
