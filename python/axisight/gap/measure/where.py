@@ -255,6 +255,8 @@ def findings(
 
 # By so much the weighted residual of an axis has to stand higher than that of the axis whose plain error does.
 _BY_FAR = 3.0
+# From where that is worth telling.
+_TOLD = 1.0
 
 
 def led_by_weight(
@@ -285,7 +287,9 @@ def led_by_weight(
     leader, *rest = (
         placed(bands, regimes, int(k), float(shares[k]), significance, of) for k in (i, *others)
     )
-    told = f"; largest residual of all axes against noise, {excess[i]:.3g} times the floor"
+    told = ""
+    if excess[i] >= _TOLD:
+        told = f"; largest residual of all axes against noise, {excess[i]:.3g} times the floor"
     return (replace(leader, evidence=leader.evidence + told), *rest)
 
 

@@ -6,9 +6,12 @@ it. The validation logs say what the table shows. One rule makes the label of an
 | arm | label of an axis |
 |---|---|
 | *none* | *none* |
-| *explained* | *explained* where a cause acts or a gap is gone with the causes; else *none* |
+| *explained* | *explained* where a cause acts or the axis has a gap; else *none* |
 | *undecidable* | as above, and *undecidable* where a cause acts that stays open |
 | *unknown* | *explained* where a cause removes the gap, *unknown* where a gap is left, else *none* |
+
+So no axis of an *explained* arm is *unknown*: `verdict_word` and the remainder say where a gap is left. At least
+one axis has the verdict of the arm. An axis that is *none* has no cause, and no place where the gap lies.
 
 An axis has a gap where one of these holds:
 

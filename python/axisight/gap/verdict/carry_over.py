@@ -16,7 +16,7 @@ from axisight.gap.facts.wording import listed, percent
 from axisight.gap.fit.tolerance_edges import BENT
 from axisight.gap.measure.by_axis import OwnAxes
 from axisight.gap.measure.gap_figures import Stage, Stages
-from axisight.gap.verdict.conclusion import Conclusion
+from axisight.gap.verdict.conclusion import Conclusion, advice_unknown
 
 Array = NDArray[np.float64]
 
@@ -83,18 +83,22 @@ def carried_over(
         return conclusion
     return replace(
         conclusion.without_causes("unknown"),
-        next_experiment=_ADVICE["noise" if withdrawn.why == "noise" else "log"],
+        next_experiment=_advice(withdrawn),
         withdrawn=withdrawn,
     )
 
 
-_ADVICE = {
-    "noise": "Run `axisight check` on the logs. Look for glitches and for frozen or missing samples.",
-    "log": (
-        "Compare the named log and axis with the estimation logs: load, pose, speed, torque range. "
-        "Record more runs like it for estimation."
-    ),
-}
+def _advice(withdrawn: Withdrawal) -> str:
+    if withdrawn.why == "noise":
+        return (
+            "Run `axisight check` on the logs. Look for glitches and for frozen or missing samples."
+        )
+    if withdrawn.log is None:
+        return advice_unknown()
+    return (
+        f"Compare axis {withdrawn.axis} of {withdrawn.log} with the estimation logs: load, pose, speed, torque "
+        "range. Record more runs like it for estimation."
+    )
 
 
 def _of_no_size(conclusion: Conclusion, stages: Stages, removed: float) -> bool:

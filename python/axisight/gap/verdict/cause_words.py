@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from axisight.effects import Effect, article, effect_info, noun
 from axisight.gap.facts.axis_names import always_there
-from axisight.gap.facts.result import Cause
+from axisight.gap.facts.result import Cause, Interval
 from axisight.gap.facts.wording import listed
 
 # Numbers of axes in words.
@@ -30,6 +30,17 @@ def named(causes: Sequence[Cause], n_axes: int = 0) -> str:
     "Coulomb and viscous friction".
     """
     return listed(_told(_phrases(causes, n_axes)))
+
+
+def labels_in_words(labels: Sequence[str], n_axes: int) -> str:
+    """Return labels ``effect@axis`` in words, as `named` does causes."""
+    out = []
+    for label in labels:
+        effect, _, axes = label.partition("@")
+        first, *second = (int(a) for a in axes.split(",") if a) if axes else (None,)
+        both = (first, second[0]) if first is not None and second else None
+        out.append(Cause(effect, first, 1.0, {}, {}, Interval(0.0, 0.0, 0.0), axes=both))
+    return named(out, n_axes)
 
 
 def sure(causes: Sequence[Cause], own: Sequence[Effect], n_axes: int) -> str:

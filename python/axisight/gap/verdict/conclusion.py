@@ -176,7 +176,7 @@ def conclude(
     torn = {one for one, _ in gains}
     causes = tuple(c.adjusted("either", 0.5) if c.label in torn else c for c in causes)
     open_groups += gains
-    advice = _advice_unknown() if verdict == "unknown" else None
+    advice = advice_unknown() if verdict == "unknown" else None
     if verdict == "undecidable":
         advice = separating_experiment(open_groups[0])
     named = {c.label for c in causes}
@@ -371,8 +371,9 @@ def _checks(found: SearchState, settings: Settings, explained: float) -> tuple[s
     return tuple(out)
 
 
-def _advice_unknown() -> str:
+def advice_unknown() -> str:
+    """Return what to do about a gap that no effect explains."""
     return (
-        "Look at the gap map: in which band and regime of that axis does the gap lie? Then record the same "
+        "Look at the gap map: in which bands and regimes do the unknown axes have their gap? Then record the same "
         "motion twice. What repeats is an effect of the machine, what does not is a disturbance."
     )

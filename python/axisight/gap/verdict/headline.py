@@ -23,7 +23,15 @@ from axisight.gap.facts.result import (
 )
 from axisight.gap.facts.withdrawal import Withdrawal
 from axisight.gap.facts.wording import listed, percent
-from axisight.gap.verdict.cause_words import axes_of, deed, in_order, named, place, sure
+from axisight.gap.verdict.cause_words import (
+    axes_of,
+    deed,
+    in_order,
+    labels_in_words,
+    named,
+    place,
+    sure,
+)
 
 __all__ = ["Facts", "clear_changes", "headline", "in_order", "named", "within_tolerances"]
 
@@ -227,6 +235,8 @@ def _gap_left(facts: Facts) -> str:
     figures = f"{percent(value)} of the {_torque(facts)} (noise alone: {percent(floor)})"
     where = next((_regime(w) for w in facts.where if w.axis == first), "")
     if at_floor(value, floor):
+        if facts.withdrawn is not None:
+            return f"Axis {first} has a gap on the estimation logs{where}, but not on the validation logs: {figures}."
         return (
             f"Axis {first} has an error on the estimation logs that no known effect explains{where}. "
             f"On validation logs it does not stand out: {figures}."
@@ -276,8 +286,10 @@ def _contradiction(facts: Facts) -> str:
         return ""
     of = f"of the {_torque(facts)}"
     before, after, floor = (percent(x) for x in (seen.before, seen.after, seen.floor))
-    tried = _tried(seen)
     there = "" if seen.axis is None else f" on axis {seen.axis} of {seen.log}"
+    several = len(seen.causes) > 1
+    tried, it = _tried(seen, facts.n_axes), "them" if several else "it"
+    not_carried = f"{tried} {'do' if several else 'does'} not carry over to the validation logs"
     if seen.why == "none":
         return (
             f"The estimation logs lack no effect, but that does not carry over to the validation logs: {after} "
@@ -289,23 +301,19 @@ def _contradiction(facts: Facts) -> str:
             "edge of their tolerance."
         )
     if seen.why == "part":
-        return f"{tried} explains only a part: with it the gap on validation logs goes from {before} to {after} {of}."
+        explain = "explain" if several else "explains"
+        only = f"{tried} {explain} only a part"
+        return f"{only}: with {it} the gap on validation logs goes from {before} to {after} {of}."
     if seen.why == "refit":
         return (
-            f"{tried} does not carry over to the validation logs: the gap is {after} {of} with it, and {before} "
-            "with the re-fit alone."
+            f"{not_carried}: the gap is {after} {of} with {it}, and {before} with the re-fit alone."
         )
-    return (
-        f"{tried} does not carry over to the validation logs: with it the gap{there} goes from {before} to "
-        f"{after} {of}."
-    )
+    return f"{not_carried}: with {it} the gap{there} goes from {before} to {after} {of}."
 
 
-def _tried(seen: Withdrawal) -> str:
-    """Return what was withdrawn, as the subject of a sentence."""
-    if not seen.causes or len(seen.causes) > _RIVALS:
-        return "What explains the estimation logs"
-    return _capital(listed([placed(label) for label in seen.causes], "with"))
+def _tried(seen: Withdrawal, n_axes: int) -> str:
+    """Return the causes that were withdrawn, as the subject of a sentence."""
+    return _capital(labels_in_words(seen.causes, n_axes)) if seen.causes else "The causes found"
 
 
 def _regime(where: Where) -> str:
