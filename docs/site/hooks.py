@@ -138,8 +138,13 @@ def policy(page: str) -> str:
     return "; ".join(["default-src 'none'", "base-uri 'none'", "form-action 'none'", *rules])
 
 
+# The theme's field for questions, which has no name for those who hear the page.
+UNNAMED = 'data-md-component="search" role="dialog"'
+
+
 def on_post_page(output: str, **_: Any) -> str:
-    """Give a page its content policy, first thing after its encoding."""
+    """Give a page its content policy, first thing after its encoding, and its search a name."""
+    output = output.replace(f"{UNNAMED}>", f'{UNNAMED} aria-label="Search">')
     meta = f'<meta http-equiv="Content-Security-Policy" content="{policy(output)}">'
     before, encoding, after = output.partition('<meta charset="utf-8">')
     if not encoding:

@@ -46,7 +46,7 @@ def usable(robot: Robot, *, inverse_dynamics: bool = False) -> dict[str, list[Pl
     """Return the effects that a robot can have, by name, and their places.
 
     One is left out where the robot refuses it everywhere, such as a play of a rigid transmission. By
-    ``inverse_dynamics`` so is one that changes no torque computed from the measured motion, such as a delay.
+    ``inverse_dynamics`` so is one that changes no torque computed from the measured motion, by the table of effects, such as a play.
     """
     found = {}
     for name, info in effect_table().items():

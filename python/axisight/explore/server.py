@@ -51,7 +51,8 @@ def free_port() -> int:
 def serve(page: Callable[[], Any], port: int = 0, title: str = "Axisight explorer") -> Served:
     """Return the server of a page, not yet at work; ``page`` makes it anew for every visit.
 
-    ``title``: of the page until it gives itself one. ``port`` 0 takes a free one. Raises InputError for a port that is in use.
+    ``title``: of the page until it gives itself one.
+    ``port`` 0 takes a free one. Raises InputError for a port that is in use.
     """
     chosen = port or free_port()
     host = f"{ADDRESS}:{chosen}"

@@ -58,7 +58,7 @@ _VERDICTS: dict[VerdictKind, tuple[str, str]] = {
 }
 _WITHIN = (
     "None, once re-fitted",
-    "The re-fit of the own parameters within their tolerances removes the gap. What is left is at the floor.",
+    "The re-fit of the simulator's own parameters within their tolerances removes the gap. The rest is at the floor.",
 )
 # Names of a diagnosis that say nothing of it.
 _NO_CASE = "logs"

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from accessible import grave_findings
+
 pytest.importorskip("mkdocs", reason="mkdocs comes with the extra `docs`")
 driver = pytest.importorskip("playwright.sync_api", reason="playwright comes with the extra `test`")
 
@@ -91,6 +93,27 @@ def test_no_page_fetches_or_runs_what_is_not_its_own(site, page):
     page.wait_for_timeout(300)
     assert len(page.wrong) == 2
     assert all("Content Security Policy" in text for text in page.wrong)
+
+
+# A beginner's way, and the two kinds of generated reference.
+READ = ("index", "start_diagnose", "cli", "effects", "python/axisight")
+
+
+@pytest.mark.parametrize("name", READ)
+def test_nothing_serious_is_found(site, name):
+    """By axe-core, on a screen and on a phone."""
+    pytest.importorskip("axe_playwright_python", reason="axe-core comes with the extra `test`")
+    with driver.sync_playwright() as running:
+        flags = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
+        browser = running.chromium.launch(executable_path=BROWSER, args=flags)
+        page = browser.new_context(bypass_csp=True).new_page()
+        for width in (1280, 400):
+            page.set_viewport_size({"width": width, "height": 900})
+            page.goto((site / f"{name}.html").as_uri())
+            page.wait_for_selector("html.js", state="attached")
+            page.wait_for_timeout(500)
+            assert grave_findings(page) == []
+        browser.close()
 
 
 def test_questions_are_answered_by_the_search(address, page):

@@ -21,6 +21,7 @@ pytest.importorskip("playwright", reason="Playwright comes with the extra `test`
 
 from playwright.sync_api import expect
 
+from accessible import grave_findings
 from explorer import BROWSER, explorer, visit
 
 pytestmark = [
@@ -110,6 +111,34 @@ def test_what_the_diagnosis_said(running, found, tmp_path):
         assert seen.wrong == []
 
 
+def test_it_fits_a_phone_and_every_reader(running):
+    """Nothing wider than 400 px and nothing serious by axe-core, on any tab."""
+    pytest.importorskip("axe_playwright_python", reason="axe-core comes with the extra `test`")
+    with visit(running.url, width=400) as seen:
+        page = seen.page
+        for tab in ("time", "residual against", "orders", "bands", "response"):
+            page.get_by_text(tab, exact=True).click()
+            page.wait_for_timeout(1000)
+            assert page.evaluate("document.documentElement.scrollWidth") <= 400, tab
+            assert page.evaluate(WIDEST) <= 400, tab
+            # By the driver: the page's policy would refuse a script of others.
+            assert grave_findings(page) == [], tab
+        assert seen.wrong == []
+
+
+# The right end of whatever is shown, within the parts of widgets too.
+WIDEST = """() => {
+  let right = 0;
+  const look = root => root.querySelectorAll("*").forEach(element => {
+    if (element.shadowRoot) { look(element.shadowRoot); }
+    const box = element.getBoundingClientRect();
+    if (box.width > 1 && element.checkVisibility()) { right = Math.max(right, box.right); }
+  });
+  look(document);
+  return right;
+}"""
+
+
 def downloaded(page, name: str, folder: Path) -> Path:
     with page.expect_download() as waited:
         page.get_by_role("button", name=name, exact=True).click()
@@ -197,7 +226,7 @@ def test_without_references_the_torque_is_predicted_from_the_motion(case, tmp_pa
         page.wait_for_function(f"() => ({DATA})('response-now-2')[0].length == 300")
         # What changes no torque computed from the measured motion is not offered.
         offered = page.get_by_label("cause", exact=True).locator("option").all_inner_texts()
-        assert "Input delay" not in offered and "Viscous friction" in offered
+        assert "Sensor delay" not in offered and "Viscous friction" in offered
         assert len(page.evaluate(DATA, "response-measured-2")[0]) == 0
         assert seen.wrong == []
 

@@ -17,6 +17,7 @@ from axisight.explore.background import Background
 from axisight.explore.beside import Beside
 from axisight.explore.exports import figure_png, robot_text
 from axisight.explore.measured import measured_gains
+from axisight.explore.plots import Regard, Responses, levels
 from axisight.explore.regard import in_bins, order_spectrum, quantity, responses
 from axisight.explore.said import read_said, said
 from axisight.explore.session import AS_GIVEN, Session, Version
@@ -237,6 +238,27 @@ def test_slider_changes_one_value(session):
     with pytest.raises(InputError):
         state.add(Effect("coulomb_friction", 7, {"coulomb_nm": 0.5}))
     assert state.version().effects == (effect,)
+
+
+def test_rounding_is_no_response():
+    gain = np.array([[1.0, 1e-3, 1e-17], [1e-6, 2e-13, np.nan]])
+    shown = levels(gain)
+    np.testing.assert_allclose(shown[:, 0], [0.0, -120.0])
+    assert shown[0, 1] == pytest.approx(-60.0)
+    assert np.isnan([shown[1, 1], shown[0, 2], shown[1, 2]]).all()
+
+
+def test_legends_name_only_what_is_drawn():
+    figure = Responses(2, ("axis1", "elbow"))
+    frequency_hz = np.array([1.0, 10.0])
+    figure.show({"given": (frequency_hz, np.array([[1.0, 1e-17], [0.1, 1e-17]]))})
+    (legend,) = figure.figure.legend
+    drawn = [item.label.value for item in legend.items if item.visible]
+    assert drawn == ["axis 1", "as given"]
+    assert legend.items[1].label.value == "axis 2 (elbow)"
+    regard = Regard()
+    regard.show("given", np.zeros(0), np.zeros(0))
+    assert regard.figure.legend[0].items[0].visible is False
 
 
 def test_names_are_escaped():

@@ -109,6 +109,21 @@ def test_effects_offered_are_those_the_robot_takes(session):
     assert (2, 3) in offered["axis_coupling"]
 
 
+def test_effects_that_change_no_computed_torque_are_not_offered_by_inverse_dynamics(session):
+    offered = usable(session.robot, inverse_dynamics=True)
+    assert not [name for name in offered if not effect_info(name).inverse_dynamics]
+    assert "sensor_delay" not in offered and "sensor_delay" in usable(session.robot)
+    assert "coulomb_friction" in offered
+
+
+def test_it_opens_where_the_gap_is_largest(session):
+    log, axis = session.largest_gap()
+    above = session.held_given**2 - session.held_floor**2
+    assert axis == np.argmax(above) == 1
+    held = [i for i, role in enumerate(session.roles) if role == "validation"]
+    assert log == max(held, key=lambda i: session.see(i).gap[axis])
+
+
 def test_slider_is_answered_in_time(session):
     took = []
     for i in range(10):
