@@ -45,8 +45,9 @@ def usual(name: str, place: Place) -> Effect:
 def usable(robot: Robot, *, inverse_dynamics: bool = False) -> dict[str, list[Place]]:
     """Return the effects that a robot can have, by name, and their places.
 
-    One is left out where the robot refuses it everywhere, such as a play of a rigid transmission. By
-    ``inverse_dynamics`` so is one that changes no torque computed from the measured motion, by the table of effects, such as a play.
+    Left out: effects that the robot refuses everywhere, such as a play of a rigid transmission. By
+    ``inverse_dynamics`` also those that change no torque computed from the measured motion, by the table
+    of effects, such as a delay of the sensor.
     """
     found = {}
     for name, info in effect_table().items():
