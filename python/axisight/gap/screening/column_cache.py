@@ -1,4 +1,4 @@
-"""What candidates do to the error, kept from one model for those after it."""
+"""Cache of the sensitivities of candidates from one model of the search to the next."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _Key = tuple[str, tuple[str, ...], tuple[float, ...]]
 
 
 class ColumnCache:
-    """Derivatives of the error by candidates that do nothing as they are, on the logs ``logs``.
+    """Sensitivities of candidates with neutral values, on the logs numbered ``logs``.
 
-    Causes that a model takes in bend them as far as it changes: enough to tell which candidates
-    promise anything on what is left, without a run.
+    A cause that is added to the model changes these sensitivities only a little. They are exact enough to tell, without
+    a simulation, which candidates gain nothing on the remaining error.
     """
 
     def __init__(self) -> None:
@@ -27,20 +27,20 @@ class ColumnCache:
         self._rows: dict[_Key, Array] = {}
 
     def begin(self, logs: Sequence[int], *, halved: bool = False) -> None:
-        """Get ready for some logs, or the first halves of them; what is known of others is of no use."""
+        """Set the logs, or their first halves (``halved``), and clear the cache if it holds other logs."""
         if (list(logs), halved) != (self.logs, self._halved):
             self.logs, self._halved = list(logs), halved
             self._rows.clear()
 
     def keep(self, option: Hypothesis, found: NormalEquations) -> None:
-        """Keep the columns of a candidate, the last effect of a model."""
+        """Store the columns of a candidate, which is the last effect of the model of ``found``."""
         last = max((place for place, _ in found.parameters if place is not None), default=None)
         own = [i for i, (place, _) in enumerate(found.parameters) if place == last]
         if [found.parameters[i][1] for i in own] == list(option.free) and found.jacobian:
             self._rows[_key(option)] = np.stack([found.jacobian[i].values for i in own])
 
     def rows(self, option: Hypothesis) -> Array | None:
-        """Return the columns of a candidate (n_parameters, n_residuals); None where not known."""
+        """Return the columns of a candidate (n_parameters, n_residuals); None if they are not in the cache."""
         return self._rows.get(_key(option))
 
 
@@ -50,7 +50,7 @@ def _key(option: Hypothesis) -> _Key:
 
 
 class Bordered:
-    """Normal equations of a fitted model, to which columns of candidates are put."""
+    """Normal equations of a fitted model that can be extended by the columns of a candidate."""
 
     def __init__(self, model: FittedModel) -> None:
         self.model = model
@@ -58,13 +58,13 @@ class Bordered:
         names = [name for _, name in model.parameters]
         own = [model.columns[key].values for key in zip(labels, names, strict=True)]
         self._rows = np.stack(own) if own else np.empty((0, len(model.residual)))
-        # A block that is beyond what a model follows has no derivatives.
+        # A block of chaotic motion has no usable derivatives.
         self._followed = np.einsum("bii->b", model.matrix) > 0 if own else model.loss > 0
 
     def with_candidate(self, option: Hypothesis, new: Array, replaced: set[str]) -> NormalEquations:
-        """Return the model with a candidate of which the columns are ``new`` (k, n_residuals).
+        """Return the normal equations of the model with a candidate whose columns are ``new`` (k, n_residuals).
 
-        ``replaced``: parameters of the simulator that it stands in for.
+        ``replaced``: the simulator's parameters that the candidate replaces.
         """
         model = self.model
         kept = [
@@ -77,7 +77,7 @@ class Bordered:
             np.zeros((len(model.loss), n + k, n + k)),
             np.zeros((len(model.loss), n + k)),
         )
-        # Most candidates stand in for nothing, and a plain copy costs a fraction of a selection.
+        # Most candidates replace no parameter, and a plain slice is cheaper than an index list.
         every = slice(None) if n == len(model.parameters) else kept
         matrix[:, :n, :n] = model.matrix[:, every][:, :, every]
         gradient[:, :n] = model.gradient[:, every]
@@ -107,7 +107,7 @@ class Bordered:
 
 
 def _priors(option: Hypothesis) -> tuple[Array, Array]:
-    """Return the precision of a candidate's priors and what they pull at its start values."""
+    """Return the precisions of a candidate's priors and the prior gradient at its start values, (k,) each."""
     values = option.effect.parameters or {}
     priors = [option.priors.get(name) for name in option.free]
     precision = np.array([0.0 if p is None else p[1] ** -2 for p in priors])
@@ -116,7 +116,7 @@ def _priors(option: Hypothesis) -> tuple[Array, Array]:
 
 
 def _room(option: Hypothesis, place: int) -> dict[tuple[int | None, str], tuple[float, float]]:
-    """Return how far down and up a candidate's parameters may go from its start values."""
+    """Return how far down and up each parameter of a candidate may move from its start value, within its bounds."""
     values = option.effect.parameters or {}
     limits = {name: option.limits(name) for name in option.free}
     return {

@@ -1,4 +1,4 @@
-"""Fits of candidates to part of the data, looked at on all of it."""
+"""Fits candidates to part of the data, then evaluates them on all of it."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, trial
 from axisight.gap.screening.screening import Screening, ScreeningModel, Start
 
-# Steps of the fit of a candidate; leaders go on from there.
+# Largest number of steps in the fit of a candidate; only leaders get more.
 _STEPS = 8
 
 
 @dataclass(frozen=True)
 class Begun:
-    """A candidate where the fit to part of the data left it.
+    """A candidate after its fit to part of the data.
 
-    ``beside``: the other effects of the model, as it left them; None where it was not fitted.
+    ``beside``: the other effects of the model after that fit; None if the candidate was not fitted.
     """
 
     start: Start
@@ -28,17 +28,17 @@ class Begun:
 
 
 class TrialFit:
-    """Fits of candidates to the data of a bench, begun on what a screen has of it."""
+    """Fits candidates to the data of ``bench``, starting from fits to the data of ``screen``."""
 
     def __init__(self, bench: ScreeningModel, screen: Screening) -> None:
         self.bench, self.screen = bench, screen
 
     def bends(self, start: Start) -> bool:
-        """Whether a candidate bends the simulator, and has sensitivities of its own."""
+        """Whether a candidate needs sensitivities of its own: it starts at other own parameters than the model's."""
         return start.robot_values is not self.bench.model.robot_values
 
     def begun(self, start: Start) -> Begun:
-        """Return a candidate fitted to the data of the screen, where that is part of the whole."""
+        """Return a candidate fitted to the data of the screen; unfitted if the screen has all data or the fit fails."""
         as_it_is = Begun(start, start.option, start.robot_values)
         part = self.screen.bench
         if part is self.bench:
@@ -51,9 +51,9 @@ class TrialFit:
         return Begun(start, option, found.robot_values, beside)
 
     def _moved(self, other: Hypothesis, option: Hypothesis) -> Hypothesis:
-        """Return an effect beside a candidate as the fit left it, or as the model has it.
+        """Return another effect as the fit left it, or as the model has it if both act on different single axes.
 
-        Those of other axes hardly move: as they are, their sensitivities need not be renewed.
+        Effects on other axes hardly change. With unchanged values, their sensitivities stay valid.
         """
         here, there = option.effect.axis, other.effect.axis
         if None in (here, there) or here == there:
@@ -62,10 +62,10 @@ class TrialFit:
         return next(f for f in self.bench.model.free if f.effect.label == label)
 
     def ended(self, begun: Begun) -> FittedHypothesis | None:
-        """Return a candidate as all data have it; None where it cannot be simulated.
+        """Return a candidate evaluated on all data; None if it cannot be simulated.
 
-        One that was fitted to part of them is looked at where that left it: what a step from there
-        would gain is part of its score.
+        A candidate that was fitted to part of the data is not fitted again here. Its score includes the gain of one
+        further linear step.
         """
         found = self._fit(self.bench, begun, _STEPS if begun.beside is None else 0)
         return None if found is None else trial(begun.start.option, found, self.bench.model)

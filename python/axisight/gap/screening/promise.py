@@ -1,4 +1,4 @@
-"""Which candidates are fitted in full, by what one linear step promises of each."""
+"""Selects the hypotheses that get a full fit, by the gain that one linear step predicts for each."""
 
 from __future__ import annotations
 
@@ -11,19 +11,21 @@ from axisight.gap.screening.screening import Start
 
 Array = NDArray[np.float64]
 
-# Candidates of an axis fitted in full: the best of the screen, and all that come near them.
+# Candidates of one axis that get a full fit: the best four, and up to eight whose predicted gain is above 0.3 of the
+# best.
 _FITTED = 4
 _NEAR = 0.3
 HOPELESS = 0.3
-"""A linear step promises less than a fit may gain; this much less of what is worth naming."""
-# Candidates fitted where none is worth it.
+"""Screening threshold, as a share of the smallest fall for a cause: one step predicts less than a fit gains."""
+# Candidates that get a full fit if none reaches the threshold.
 _LOOKED_AT = 3
 
 
 def promising(starts: Sequence[Start], worth: Array) -> list[Start]:
-    """Return the candidates to fit: at every place the best, where anything is to be gained.
+    """Return the candidates that get a full fit: on each axis the best of those above the screening threshold.
 
-    ``worth`` (n_axes,): what a cause takes away of the loss of an axis at least.
+    Without any such candidate, the best three of all are returned. ``worth`` (n_axes,): smallest fall of an axis's loss
+    that a cause must bring.
     """
     ranked = sorted(starts, key=lambda s: -s.gain)
     best = best_by_axis(starts, len(worth))
@@ -38,14 +40,16 @@ def promising(starts: Sequence[Start], worth: Array) -> list[Start]:
         keep += [s for s in _at_home(mine, least) if all(s is not k for k in keep)]
     of_the_arm = least_of_the_arm(worth, best)
     keep += [s for s in ranked if s.falls is not None and np.any(s.falls > of_the_arm)]
-    # Where nothing is worth a cause, the best of all still say what was looked at.
+    # If no candidate reaches the threshold, the report still names the best ones that were tried.
     return keep or ranked[:_LOOKED_AT]
 
 
 def _at_home(mine: Sequence[Start], least: float) -> list[Start]:
-    """Return the best of an axis by what they gain there, of those that are worth it in all.
+    """Return the best candidates of an axis by their gain on that axis.
 
-    One whose gain lies elsewhere (a link whose weight the axis before it feels) takes no place from them.
+    Only candidates whose total gain is above the threshold ``least`` take part. The next axis may gain most from a
+    candidate: a link's weight also loads the axis before it. Such a candidate must not displace those that explain the
+    axis itself.
     """
     worthy = [start for start in mine if start.gain > least]
     gains = [(start.gain if start.at_home is None else start.at_home, start) for start in worthy]
@@ -54,15 +58,15 @@ def _at_home(mine: Sequence[Start], least: float) -> list[Start]:
 
 
 def least_of_the_arm(worth: Array, best: Array) -> Array:
-    """Return what an effect of the whole arm has to promise on an axis (n_axes,).
+    """Return the gain that an effect of the whole arm must promise on an axis (n_axes,).
 
-    It has to come near the ``best`` of those of one axis.
+    ``worth``: smallest fall that a cause must bring; ``best``: best gain of a candidate that acts on that axis alone.
     """
     return np.asarray(np.maximum(HOPELESS * worth, _NEAR * best))
 
 
 def best_by_axis(starts: Sequence[Start], n_axes: int) -> Array:
-    """Return the most that a candidate of each axis promises (n_axes,)."""
+    """Return the largest gain that a candidate of each axis promises (n_axes,), zero without candidates."""
     best = np.full(n_axes, -np.inf)
     for start in starts:
         if (axis := start.option.effect.axis) is not None:

@@ -1,7 +1,7 @@
-"""Laws of a gear begun on the curve of torque over deflection that the fit of another one found.
+"""Starts gear laws from the torque-deflection curve that the fit of another law of the same gear found.
 
-Of laws with several numbers one may lead because the others ended in a wrong valley. Every law is held
-against the leader where its curve comes closest to that.
+Laws with several parameters may lose only because their fit ended in a local minimum. Each law is therefore fitted
+again from the point where its curve is closest to the leader's curve.
 """
 
 from __future__ import annotations
@@ -24,18 +24,20 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Share of what the leader explains from which a law is where it belongs.
+# Share of the leader's score above which a law needs no restart; start value of the damping in the backlash gap [1];
+# number of torques at which curves are compared.
 _NEAR = 0.998
 _HALF = 0.5
 _POINTS = 200
-# By how much the stiffness may be another, and what that counts beside a deflection.
+# Largest relative change of the stiffness beside a law [1], and the weight of that change beside an error of the
+# deflection, both relative.
 _OTHERS = 0.25
 _HARDLY = 0.1
-# A law bends as the leader does where it leaves no more than this share of the bend; less than a
-# hundredth of the largest deflection is none.
+# A law can follow the leader's curve if at most this share of the curve's bend is left. A bend below 1 % of the largest
+# deflection counts as straight.
 _FOLLOWED = 0.5
 _STRAIGHT = 0.01
-# Deflections looked at, in the largest of the linear spring; and how finely.
+# Range of deflections, in multiples of the linear spring's largest deflection, and number of grid points.
 _WIDEST = 20.0
 _FINE = 8_001
 
@@ -43,15 +45,14 @@ _FINE = 8_001
 def begun_on_curves(
     standings: Sequence[AxisPosterior], led: set[str], options: Sequence[Hypothesis], robot: Robot
 ) -> list[tuple[FittedModel, Hypothesis, dict[str, float]]]:
-    """Return what begins on the curves of laws that were not among those that ``led``, which they join.
+    """Return the restarts on curves of leading laws that are not yet in ``led``; adds these leaders to ``led``.
 
-    Each with the model whose last effect it takes the place of, and with where the simulator's own
-    parameters begin.
+    Each restart: the model whose last effect is replaced, the new hypothesis, and start values of the own parameters.
     """
     begun = []
     for standing in standings:
         law = best_law(standing)
-        if law is not None and (label := _led_as(law.trial)) not in led:
+        if law is not None and (label := _key_of_leader(law.trial)) not in led:
             led.add(label)
             others = others_of_its_gear(law, standing, options, robot)
             begun += [(law.trial.fitted, *other) for other in others]
@@ -59,7 +60,7 @@ def begun_on_curves(
 
 
 def best_law(standing: AxisPosterior) -> RankedHypothesis | None:
-    """Return the law of a gear that explains most of its axis, where one of its gear leads there."""
+    """Return the gear law that explains most of its axis; None unless a law of that axis's gear leads it."""
     here = standing.axis + 1
     laws = [r for r in standing.ranked if r.trial.hypothesis.effect.axis == here and _is_law(r)]
     if standing.best not in laws:
@@ -67,8 +68,11 @@ def best_law(standing: AxisPosterior) -> RankedHypothesis | None:
     return max(laws, key=lambda r: r.score)
 
 
-def _led_as(law: FittedHypothesis) -> str:
-    """Return what a law that leads is remembered by: play with what is damped in its gap is another."""
+def _key_of_leader(law: FittedHypothesis) -> str:
+    """Return the key of a leading law: its label and free parameters.
+
+    Backlash with free gap damping counts as another law than backlash without.
+    """
     return " ".join((law.label, *law.hypothesis.free))
 
 
@@ -79,14 +83,13 @@ def _is_law(one: RankedHypothesis) -> bool:
 def others_of_its_gear(
     best: RankedHypothesis, standing: AxisPosterior, options: Sequence[Hypothesis], robot: Robot
 ) -> list[tuple[Hypothesis, dict[str, float]]]:
-    """Return the other laws of the gear of an axis, begun on the curve of the ``best``.
+    """Return the other laws of the same gear, started on the curve of ``best``, with starts of the own parameters.
 
-    Each with the values that the simulator's own parameters begin at.
+    Returns nothing if the model already has another law of this gear: a second law only corrects the first. Laws that
+    score nearly as much with sensitivities of their own are skipped.
 
-    Those that explain as much with sensitivities of their own are where they belong; none where the model
-    has a law of the gear already: another one mends that. Play is first fitted with what is damped in the
-    gap free; the others have no corners, and come as close where they are nearly play themselves, which is
-    needed only where it leaves something.
+    Backlash is first fitted with its gap damping free. If that fit leaves almost no error, the other laws are skipped:
+    they have no corners and could only imitate it.
     """
     fitted, axis = best.trial.fitted, standing.axis + 1
     leader = fitted.effects[-1]
@@ -115,26 +118,26 @@ def others_of_its_gear(
 
 
 def _in_place(one: FittedHypothesis) -> bool:
-    """Whether a fit of a law has sensitivities of its own, and all its numbers."""
+    """Whether a fitted law has sensitivities of its own and all its parameters free."""
     return one.fitted.renewed and not _still_held(one.hypothesis)
 
 
 def _held_first(name: str) -> tuple[str, ...]:
-    """Return the parameters of a law that first fits hold: of play what is damped in its gap."""
+    """Return the parameters that the first fit of a law holds fixed, such as the damping in a backlash gap."""
     return effect_info(name).marked("held_first")
 
 
 def _still_held(option: Hypothesis) -> list[str]:
-    """Return those of them that are not free."""
+    """Return those parameters of a candidate that are still held fixed."""
     return [name for name in _held_first(option.effect.name) if name not in option.free]
 
 
 def _damped_too(option: Hypothesis, leader: Effect) -> Hypothesis:
-    """Return play with what is damped in the gap free too, begun as the leader has it; other laws as they are."""
+    """Return a law with its held parameters free, started at the leader's values; other laws unchanged."""
     held = _still_held(option)
     if not held:
         return option
-    # Laws without a gap damp everywhere.
+    # A law without a gap has damping everywhere.
     begin = dict.fromkeys(held, 1.0)
     if leader.name == option.effect.name:
         begin = {name: (leader.parameters or {}).get(name) or _HALF for name in held}
@@ -144,12 +147,13 @@ def _damped_too(option: Hypothesis, leader: Effect) -> Hypothesis:
 def on_the_curve(
     leader: Effect, option: Hypothesis, stiffness_nm_rad: float
 ) -> tuple[Hypothesis, float] | None:
-    """Return a law of the same gear begun where its curve comes closest to that of ``leader``.
+    """Return another law of the same gear, started where its curve is closest to that of ``leader``.
 
-    With the share of the stiffness that its spring begins with: parameters of the simulator are fitted beside it.
-    What a gear is turned by the mean torque, such as that of gravity, no motor angle shows: curves count from there.
-    None where either is no such law, nothing is known of the deflections, or the law cannot bend as the
-    leader does. ``stiffness_nm_rad``: of the spring without laws, as it was re-fitted.
+    The second value is the start of the spring's stiffness, as a factor of ``stiffness_nm_rad``, because the own
+    parameters are fitted along. ``stiffness_nm_rad``: the re-fitted stiffness of the plain spring [Nm/rad]. Curves are
+    compared without their mean deflection: no motor angle shows how far the mean torque, such as gravity, turns a gear.
+
+    None if either effect is no gear law, if the deflections are unknown, or if the law cannot bend like the leader.
     """
     mine, other = CURVES.get(option.effect.name), CURVES.get(leader.name)
     reach = option.deflections_rad
@@ -160,13 +164,13 @@ def on_the_curve(
     torque = np.linspace(*reach, _POINTS)
 
     def turned(law: Curve, values: Mapping[str, float], share: float = 1.0) -> Array:
-        """Return how far a law turns under the torques, from where it is in the mean."""
+        """Return the deflection (n_torques,) of a law, without its mean, per largest linear deflection."""
         held = np.maximum.accumulate(share * law(grid, values, share * stiffness_nm_rad))
         deflection = np.interp(torque, held, grid)
         return np.asarray((deflection - deflection.mean()) / top)
 
     wanted = turned(other, _named(leader))
-    # What is damped no curve shows.
+    # A static curve does not depend on damping.
     free = [name for name in option.free if name not in _held_first(option.effect.name)]
     low, high = np.transpose([(1 - _OTHERS, 1 + _OTHERS), *(option.limits(n) for n in free)])
     scale = np.array([1.0, *_typical(option.effect, free)])
@@ -175,10 +179,11 @@ def on_the_curve(
     def misfit(scaled: Array) -> Array:
         share, *found = scaled * scale
         off = turned(mine, {**values, **dict(zip(free, found, strict=True))}, share) - wanted
-        # Of two that do alike the one that leaves the stiffness as it is.
+        # Of two equally good solutions, prefer the one that leaves the stiffness unchanged.
         return np.append(off, _HARDLY * (share - 1))
 
-    # Of a knee the width of a soft middle is known; the rest is found from there.
+    # Values with the same quantity, such as the width of a knee for a soft middle, are taken over; the rest is
+    # searched.
     starts = (in_common(leader, effect_info(option.effect.name)), {}, *option.starts)
     begun = [[1.0, *({**values, **start}[name] for name in free)] for start in starts]
     found = [
@@ -194,7 +199,7 @@ def on_the_curve(
 
 
 def _bend(torque: Array, deflection: Array) -> float:
-    """Return how far a deflection is from a straight line over the torque, root mean square."""
+    """Return the rms distance of a deflection from a straight line over the torque."""
     centred = torque - torque.mean()
     line = centred * float(centred @ deflection) / float(centred @ centred)
     return float(np.std(deflection - line))

@@ -1,7 +1,7 @@
-"""More usual effects begun where the fit of a less usual one ended, which is them at its limits.
+"""Starts a common effect from the fit of a rarer one that includes it as a limit case.
 
-A soft middle of a gear without any stiffness is play: where the simulator is still far off, the
-valley of the play is too narrow for its own start, and that of the soft middle leads into it.
+Example: a gear with a soft middle of zero stiffness has backlash. While the simulator is far from the machine, the
+minimum of backlash is too narrow for its own start values, but the fit of the soft middle leads into it.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from axisight.gap.screening.screening import Start
 def begun_where_it_ended(
     leader: FittedHypothesis, options: Sequence[Hypothesis], tried: Collection[str]
 ) -> list[Start]:
-    """Return the candidates more usual than ``leader``, with the shape that its fit found.
+    """Return the common look-alikes of ``leader`` as candidates that start at the values of its fit.
 
-    Of ``options`` those that were not ``tried``, by label, and have a shape or size in common with it.
+    ``options``: all candidates; those whose label is in ``tried``, or that share no quantity with the leader, are left
+    out.
     """
     fitted = leader.fitted.effects[-1]
     usual = effect_info(fitted.name).usual
@@ -35,22 +36,23 @@ def begun_where_it_ended(
 
 
 def more_usual(leader: FittedHypothesis) -> set[str]:
-    """Return the labels of what is more usual than a leader, on its axis or of the arm."""
+    """Return the labels of the common look-alikes of a leader, on its axis or of the arm."""
     effect = leader.hypothesis.effect
     usual = map(effect_info, effect_info(effect.name).usual)
     return {Effect(i.name, None if i.scope == "arm" else effect.axis).label for i in usual}
 
 
 def ended_at_bound(one: FittedHypothesis) -> bool:
-    """Whether a number of a candidate ended at its bound: at its limits a law may be the usual one."""
+    """Whether a parameter of a candidate ended at its bound, where the law may equal a common look-alike."""
     last = len(one.fitted.effects) - 1
     return any(place == last for place, _ in one.fitted.ended_at_bound)
 
 
 def in_common(fitted: Effect, info: EffectInfo) -> Mapping[str, float]:
-    """Return the values of a fitted effect that another one takes, of the same quantity.
+    """Return the values of a fitted effect that another effect takes over, by parameter name.
 
-    That is one with a unit; the same name says so, or the same unit where only one parameter has it.
+    A parameter matches by the same name and unit. The same unit suffices if only one fitted parameter has it.
+    Parameters without a unit never match.
     """
     own = effect_info(fitted.name).parameters
     units = [p.unit for p in own]

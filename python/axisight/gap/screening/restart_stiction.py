@@ -1,7 +1,7 @@
-"""Bristles that hold more than they slip with, begun where those that do not ended.
+"""Starts stiction (break-away torque above sliding friction) from the fit of pre-sliding friction without it.
 
-How friction falls once it slips shows only beside how it yields before: of all its numbers at once a fit ends in a
-wrong valley, and what holds no more leaves a part that no other law mends.
+How friction falls after break-away shows only beside correct pre-sliding. A fit of all parameters at once ends in a
+local minimum. Without stiction, an error stays that no other law can remove.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from axisight.effects.relations import Later
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 
-# Share of the explainable error that bristles have to leave for how they break away to be looked for in it.
+# Smallest share of the explainable error that pre-sliding friction must leave before stiction is fitted.
 _LEAVES = 0.003
 
 
 def begun_sticking(
     standings: Sequence[AxisPosterior], options: Sequence[Hypothesis]
 ) -> list[tuple[FittedModel, Hypothesis]]:
-    """Return bristles that stick for axes that friction leads on, each with those it takes the place of.
+    """Return restarts with stiction for axes that friction leads, each with the model whose last effect is replaced.
 
-    And whatever else has numbers that are looked for later. ``options``: all candidates; over which speeds
-    Stribeck friction is looked for they are, too.
+    The same holds for every law whose table entry has parameters to be fitted ``later``. ``options``: all candidates.
+    The range of speeds over which friction falls is taken from the Stribeck candidate.
     """
     sticking = [(info.name, info.later) for info in effect_table().values() if info.later]
     begun: list[tuple[FittedModel, Hypothesis]] = []
@@ -42,7 +42,7 @@ def begun_sticking(
 def _sticking(
     yielding: Hypothesis, fitted: Effect, later: Later, falling: Hypothesis
 ) -> list[Hypothesis]:
-    """Return a law with its later numbers free, begun at each shape at which a like one is."""
+    """Return a law with its later parameters free, once for each start value of the shape that ``falling`` has."""
     ratio, speed = later.amplitude, later.shape
     least = next(p.neutral for p in effect_info(fitted.name).parameters if p.name == ratio)
     first = float((falling.effect.parameters or {})[speed])
@@ -63,7 +63,10 @@ def _sticking(
 
 
 def _yielding(standing: AxisPosterior, name: str, later: Later) -> RankedHypothesis | None:
-    """Return a law of an axis that a law of its family leads on, without its later numbers, which leaves something."""
+    """Return the fitted law ``name`` without its later parameters, if a law of its family leads the axis; else None.
+
+    None also if it leaves too little of the error.
+    """
     label = Effect(name, standing.axis + 1).label
     leader = standing.best.trial.hypothesis.effect
     alike = effect_info(leader.name).family == effect_info(name).family

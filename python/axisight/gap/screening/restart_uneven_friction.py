@@ -1,7 +1,8 @@
-"""Dry friction that changes with the angle, begun where friction which is the same everywhere ended.
+"""Starts position-dependent friction from the fit of dry friction that is the same at every angle.
 
-Its wave is looked for in what is left of a model. While all of dry friction is left, beside a gap elsewhere, the
-wave found may be another's, and the fit ends in its valley; a law that holds another cannot leave more than it.
+The wave of position-dependent friction is estimated from the residual of a model. While that residual still holds all
+dry friction and other errors, the estimate may be wrong and the fit ends in a local minimum. A law that contains
+another can fit no worse than the contained one, so a worse fit is repeated.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.posterior import AxisPosterior
 
-# Share of the explainable error that even friction has to leave for another law to be looked for in it.
+# Smallest share of the explainable error that uniform friction must leave before position-dependent friction is fitted.
 _LEAVES = 0.01
 
 
@@ -23,9 +24,11 @@ def begun_wider(
     trials: Sequence[FittedHypothesis],
     offered: Callable[[FittedModel], Sequence[Hypothesis]],
 ) -> list[tuple[FittedModel, Hypothesis]]:
-    """Return uneven friction for axes that even friction leads on, each with the model it takes the place in.
+    """Return restarts with position-dependent friction for axes that uniform friction leads.
 
-    And whatever else begins from the law that leads. ``offered``: candidates for what is left of a model.
+    Each with the model whose last effect it replaces. The same holds for every effect whose table entry names a law
+    that it begins from. A candidate whose fit is already as good as the contained law is left out. ``offered``: returns
+    candidates for the residual of a model.
     """
     known = {t.label: t for t in trials}
     wider = [(info.name, info.begun_from) for info in effect_table().values() if info.begun_from]
@@ -45,6 +48,6 @@ def begun_wider(
 
 
 def _as_even(even: Effect, begun: BegunFrom) -> dict[str, float]:
-    """Return what uneven friction takes over from one that is the same everywhere."""
+    """Return the values that position-dependent friction takes over from uniform friction."""
     values = even.parameters or {}
     return {taken: values[name] for name, taken in begun.takes.items() if name in values}

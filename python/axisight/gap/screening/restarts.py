@@ -1,8 +1,8 @@
-"""Hypotheses begun where the fit of a leader ended, in its place.
+"""Fits hypotheses again that replace the leader of an axis, starting from the leader's fit.
 
-Some valleys are too narrow for a start of their own: a law of a gear is begun on the curve of another one, bristles
-that stick where those that do not ended, uneven friction where even friction did. Of several starts of one
-hypothesis those are fitted that promise most by one linear step.
+Some minima are too narrow for start values from data. Three kinds of restarts exist: gear laws on the curve of another
+law, stiction after pre-sliding, and position-dependent friction after uniform friction. If one hypothesis has several
+starts, one linear step selects those that get a fit.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from axisight.gap.screening.restart_stiction import begun_sticking
 from axisight.gap.screening.restart_uneven_friction import begun_wider
 
 Restart = tuple[FittedModel, Hypothesis, Mapping[str, float]]
-"""The model whose last effect is replaced, by what, and where the simulator's own parameters begin."""
+"""The model whose last effect is replaced, the hypothesis that replaces it, and start values of the own parameters."""
 
 
 class Field(Protocol):
-    """The round whose leaders are replaced; see `SearchRound`."""
+    """The part of `SearchRound` that restarts need."""
 
     fitter: ModelFitter
     model: FittedModel
@@ -37,29 +37,29 @@ class Field(Protocol):
 
     @property
     def rough(self) -> ModelFitter | None:
-        """The fitter for part of the data; None where that is all."""
+        """The fitter for part of the data; None if candidates are screened on all data."""
 
     @property
     def screened(self) -> FittedModel:
-        """The model as that part of the data has it."""
+        """The model on that part of the data."""
 
     @property
     def skipped(self) -> dict[str, str]:
         """Candidates that failed, with the reason."""
 
     def standings(self, trials: Sequence[FittedHypothesis]) -> list[AxisPosterior]:
-        """Return how the trials stand on each axis."""
+        """Return the posteriors of the axes that the trials improve."""
 
     def looked_at(self, begun: FittedModel) -> FittedModel | Diverged:
-        """Return a fit to part of the data as all of them have it."""
+        """Return a fit to part of the data, evaluated on all of it."""
 
 
-# Starts of one hypothesis that are fitted: the first by promise, and one that may lie in another valley.
+# Starts of one hypothesis that get a fit: the best two by one linear step. The second may lie in another minimum.
 _STARTS_FITTED = 2
 
 
 class Restarts:
-    """What is like the leaders of a round and has to begin where they ended."""
+    """Restarts of one round: hypotheses that start where the fit of a leader ended."""
 
     def __init__(self, of: Field, pool: ThreadPoolExecutor) -> None:
         self.round, self.pool = of, pool
@@ -67,7 +67,7 @@ class Restarts:
     def added(
         self, trials: list[FittedHypothesis], options: Sequence[Hypothesis]
     ) -> list[FittedHypothesis]:
-        """Return the trials with what was begun in the place of leaders, where that fits better."""
+        """Return the trials with restarts added, or put in place of the same hypothesis if they fit better."""
         here = self.round
         trials = self._with_gears(trials, options)
         wider = begun_wider(here.standings(trials), trials, here.offered)
@@ -79,9 +79,9 @@ class Restarts:
     def _with_gears(
         self, trials: list[FittedHypothesis], options: Sequence[Hypothesis]
     ) -> list[FittedHypothesis]:
-        """Add laws of the gear that another one leads on, begun on its curve; or put them where they fit better.
+        """Add restarts of gear laws until no new law leads.
 
-        One that leads then has a curve of its own.
+        A law that becomes the leader has a curve of its own, from which the others start again.
         """
         led: set[str] = set()
         here = self.round
@@ -92,7 +92,7 @@ class Restarts:
     def _with_better(
         self, trials: Sequence[FittedHypothesis], begun: Sequence[Restart]
     ) -> list[FittedHypothesis]:
-        """Add what is begun in the place of leaders, or put it where it fits better than it did."""
+        """Fit restarts; add those that are new, and replace those that fit better than before."""
         known = {t.label: t for t in trials}
         for found in self.pool.map(lambda one: self._fitted(*one), self._promising(begun)):
             if found is not None:
@@ -102,7 +102,7 @@ class Restarts:
         return list(known.values())
 
     def _promising(self, begun: Sequence[Restart]) -> list[Restart]:
-        """Return the restarts, of several of one hypothesis those that promise most by one linear step."""
+        """Return the restarts to fit: of each hypothesis the best ``_STARTS_FITTED`` by one linear step."""
         by_label: dict[str, list[Restart]] = {}
         for one in begun:
             by_label.setdefault(one[1].effect.label, []).append(one)
@@ -115,12 +115,12 @@ class Restarts:
         ]
 
     def _promised(self, one: Restart) -> float:
-        """Return the loss that one linear step from a restart leads to; infinite where it does not hold."""
+        """Return the loss that one linear step from a restart predicts; infinite if it diverges."""
         leader, option, values = one
         part = self.round.rough or self.round.fitter
         if part is not self.round.fitter:
-            # Its sensitivities are those of all of the data. Those of the screened model, for what is beside its last
-            # effect, are near enough to order starts.
+            # The leader's columns belong to all data. The columns of the screened model are near enough to order
+            # starts.
             leader = replace(leader, columns=self.round.screened.columns)
         at = part.evaluate([*leader.free[:-1], option], leader, robot_values=values)
         return float("inf") if isinstance(at, Diverged) else at.total - linear_gain(at)
@@ -128,7 +128,7 @@ class Restarts:
     def _with_lags(
         self, trials: list[FittedHypothesis], options: Sequence[Hypothesis]
     ) -> list[FittedHypothesis]:
-        """Put delays and lags of axes that one of them leads on where their fits end."""
+        """Replace delays and lags by their fully converged fits, on axes that one of them leads."""
         known = {t.label: t for t in trials}
         for standing in self.round.standings(trials):
             if lags := lags_beside(standing):
@@ -140,7 +140,7 @@ class Restarts:
     def _fitted(
         self, leader: FittedModel, option: Hypothesis, values: Mapping[str, float]
     ) -> FittedHypothesis | None:
-        """Return a trial begun where a leader ended, in its place; None where it cannot be simulated."""
+        """Return a trial fitted in the place of a leader, from the leader's values; None if it cannot be simulated."""
         here = self.round
         part = here.rough or here.fitter
         free = [*leader.free[:-1], option]

@@ -1,4 +1,4 @@
-"""The screen: what every candidate promises by one linear step, and where its fit begins."""
+"""Screening: one linear step for every hypothesis gives its predicted gain and the start of its fit."""
 
 from __future__ import annotations
 
@@ -26,34 +26,36 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 A = TypeVar("A")
 
-# Parameters of candidates that are screened together: the core takes so many derivatives at once.
+# Free parameters of candidates that are screened in one evaluation: the core takes this many derivatives at once.
 _TOGETHER = 4
-# Evaluations between two starts of an effect.
+# Largest number of evaluations between two start values of an effect.
 _SCANS = 10
-# Share of the loss that the first start of a candidate has to promise where others are dear.
+# Share of the loss that the first start of an acting candidate must promise. Each further start costs a simulation.
 _LEAST_GAIN = 0.002
-# Share of the most that there is to explain in as many logs, where others stay the ones to screen on.
+# The logs of the last screening stay in use if they hold this share of the error that the same number of logs can hold.
 _NEARLY = 0.8
-# Beginnings of logs do for a screen where they have this share of what there is on every axis that
-# has anything, a mean square of so much.
+# First halves of the logs suffice for screening if they hold this share of the loss above the floor, on every axis
+# whose mean square above the floor exceeds 0.05 of the noise.
 _THEIR_PART = 0.35
 _SOMETHING = 0.05
-# Logs that the core runs in lock-step: fewer cost as much.
+# Number of logs that the core simulates in lock-step: fewer cost as much.
 _LOCK_STEP = 4
 
 
 def kept_beside(free: Sequence[Hypothesis], new: Hypothesis) -> list[Hypothesis]:
-    """Return the effects of a model without those that a new one contains at the same place."""
+    """Return the effects of a model without those that a new effect contains on the same axis."""
     contains = effect_info(new.effect.name).contains
     return [f for f in free if f.effect.name not in contains or f.effect.axis != new.effect.axis]
 
 
 @dataclass(frozen=True)
 class Start:
-    """Where the fit of a candidate begins, and the gain it promises.
+    """Where the fit of a candidate begins, and the gain that it promises.
 
-    ``falls`` (n_axes,): by axis, of one that acts on the whole arm; ``at_home``: what of the gain is on its
-    axis, of one that has one; ``sensitivity``: of one that does nothing as it is.
+    - ``gain``: predicted fall of the loss.
+    - ``falls`` (n_axes,): fall by axis, for effects of the whole arm.
+    - ``at_home``: fall on the candidate's own axis, for effects of one axis.
+    - ``sensitivity``: for candidates whose start values have no effect.
     """
 
     option: Hypothesis
@@ -65,9 +67,9 @@ class Start:
 
 
 class ScreeningModel:
-    """A model that candidates are tried on, with its runs, which those close to it follow.
+    """A model to which candidates are added, with its simulated runs, which speed up nearby simulations.
 
-    Candidates that cannot be simulated are out; ``skipped`` has them with the reason.
+    ``skipped``: candidates that cannot be simulated, with the reason.
     """
 
     def __init__(self, fitter: ModelFitter, model: FittedModel) -> None:
@@ -77,13 +79,13 @@ class ScreeningModel:
 
     @cached_property
     def near(self) -> Courses | None:
-        """Runs of the model."""
+        """Simulated runs of the model; None if there are none."""
         return self._runs(self.model.robot_values)
 
     def begin_nominal(self) -> None:
-        """Get ready for candidates that begin at the nominal values of the simulator's own parameters.
+        """Simulate the model at nominal own parameters, for candidates that start there.
 
-        Where it cannot be simulated with these alone, candidates are tried without runs to follow.
+        If that simulation diverges, these candidates are tried without runs to start from.
         """
         self.near_nominal = self._runs({})
 
@@ -100,14 +102,14 @@ class ScreeningModel:
         beside: Sequence[Hypothesis] | None = None,
         close: bool = False,
     ) -> A | None:
-        """Return what ``solve`` of the fitter makes of a candidate; None where it cannot.
+        """Return the result of ``solve``, a method of the fitter, for a candidate; None if it diverges.
 
-        ``values``: where the simulator's own parameters begin, the model's unless given; ``close``: near
-        the model's. ``beside``: the other effects, those of the model unless given.
+        ``values``: start of the own parameters, by default the model's; ``close``: they stay near the model's.
+        ``beside``: the other effects, by default those of the model.
         """
         others = kept_beside(self.model.free, option) if beside is None else beside
         effects = [*others, option]
-        # Runs serve where the simulator's own parameters are those of the runs, or near them.
+        # Stored runs help only if own parameters equal those of the runs or are close to them.
         as_model = close or values is None or values == self.model.robot_values
         near = self.near if as_model else self.near_nominal
         found = solve(effects, self.model, robot_values=values, near=near)
@@ -118,10 +120,10 @@ class ScreeningModel:
 
 
 class Screening:
-    """The screen of one model.
+    """Screening of one model.
 
-    Where the bench has only some of the logs, ``scale`` is that of gains, ``more`` of data. What
-    candidates that do nothing as they are do to the error goes to ``kept``.
+    If the bench has only part of the data: ``scale`` converts gains and ``more`` amounts of data to the whole.
+    ``kept``: cache for the sensitivities of candidates whose start values have no effect.
     """
 
     def __init__(
@@ -134,20 +136,20 @@ class Screening:
         self.bench, self.scale, self.more = bench, scale, more
         self.fitter, self.model = bench.fitter, bench.model
         self.kept = ColumnCache() if kept is None else kept
-        # What the simulator's own parameters gain by a step to what is best on these logs.
+        # Gain of one step of the simulator's own parameters to their best values on these logs.
         self._own, self._own_falls = linear_gain(self.model), linear_falls(self.model)
 
     def from_kept(self) -> CachedScreening:
-        """Return the screen by what was kept."""
+        """Return a screening that uses cached sensitivities only."""
         return CachedScreening(self.bench, self.scale, self.more, self.kept)
 
     def idle(self, option: Hypothesis) -> bool:
-        """Whether a candidate does nothing to the model as it is."""
+        """Whether adding a candidate at its start values leaves the model unchanged."""
         beside = kept_beside(self.model.free, option)
         return not option.effect.acts and len(beside) == len(self.model.free)
 
     def groups(self, options: Sequence[Hypothesis]) -> list[list[Hypothesis]]:
-        """Return the candidates by evaluation: those that do nothing as they are share one."""
+        """Return the candidates grouped by evaluation: those without effect at their start values share one."""
         alone: list[Hypothesis] = []
         together: list[Hypothesis] = []
         for option in options:
@@ -164,13 +166,13 @@ class Screening:
         return [[option] for option in alone] + groups
 
     def starts(self, group: list[Hypothesis]) -> list[Start]:
-        """Return where fits of the candidates would begin, and what they promise."""
+        """Return the best start of each candidate of a group, with its predicted gain."""
         found = self._shared(group)
         best = (self._best_start(o, e) for o, e in zip(group, found, strict=True))
         return [self._scaled(start) for start in best]
 
     def sensitivities(self, group: list[Hypothesis]) -> list[Sensitivity]:
-        """Return the sensitivities of candidates, of those that do nothing as they are."""
+        """Return the sensitivities of those candidates of a group whose start values have no effect."""
         found = zip(group, self._shared(group), strict=True)
         known = [sensitivity(o, e, self.model.axis) for o, e in found if e is not None]
         return [s.scaled(self.more) for s in known if s is not None]
@@ -183,11 +185,11 @@ class Screening:
         return replace(start, gain=gain, falls=falls, sensitivity=known, at_home=home)
 
     def _evaluated(self, options: Sequence[Hypothesis]) -> list[NormalEquations | None]:
-        """Return the model with each of several candidates of one size, as many at a time as go."""
+        """Return the normal equations of the model with each candidate, with as many per evaluation as possible."""
         return [found for group in self.groups(options) for found in self._shared(group)]
 
     def _shared(self, group: Sequence[Hypothesis]) -> list[NormalEquations | None]:
-        """Return the model with each of a group, by one evaluation if they allow it."""
+        """Return the normal equations of the model with each candidate of a group; None for those that diverge."""
         found = self._run(group)
         for option, fitted in zip(group, found, strict=True):
             if fitted is not None and self.idle(option):
@@ -197,17 +199,17 @@ class Screening:
     def _run(self, group: Sequence[Hypothesis]) -> list[NormalEquations | None]:
         if len(group) > 1:
             together = self.fitter.evaluate_each(group, self.model, self.bench.near)
-            # One that cannot be simulated leaves all to be tried alone.
+            # If one candidate diverges, each is evaluated alone.
             if not isinstance(together, Diverged):
                 return list(together)
         return [self.bench.attempt(self.fitter.evaluate, o, None) for o in group]
 
     def _best_start(self, option: Hypothesis, fitted: NormalEquations | None) -> Start:
         best = self._start(option, fitted)
-        # One that acts as it is costs a run of its own for every start.
+        # A candidate with an effect at its start values costs one simulation for every start.
         hopeless = option.effect.acts and best.gain < _LEAST_GAIN * self.model.total
         if len(option.free) > 1 and not hopeless:
-            # Further starts, by what a step from there promises.
+            # Compare further starts by the gain that one linear step promises.
             begins = [option.at(values) for values in option.starts]
             others = self._evaluated(self._at_starts(option))
             starts = (self._start(b, e) for b, e in zip(begins, others, strict=True))
@@ -221,15 +223,15 @@ class Screening:
         return best
 
     def _at_starts(self, option: Hypothesis) -> list[Hypothesis]:
-        """Return a candidate at its further starts.
+        """Return a candidate at its further start values, with only its amplitudes free.
 
-        Only sizes: where one does nothing as it is, its shape shows nothing.
+        The shape of an effect with zero amplitude changes nothing.
         """
         sizes = replace(option, free=tuple(n for n in option.free if n in _amplitudes(option)))
         return [sizes.at(option.at(v).effect.parameters or {}) for v in option.starts]
 
     def _start(self, option: Hypothesis, fitted: NormalEquations | None) -> Start:
-        """Return a candidate with what one linear step promises where ``fitted`` has it."""
+        """Return a candidate with the gain that one linear step from ``fitted`` promises."""
         if fitted is None:
             return Start(option, self.model.robot_values, -np.inf)
         gain = self.model.total - fitted.total + linear_gain(fitted) - self._own
@@ -242,16 +244,16 @@ class Screening:
         return replace(start, at_home=float(falls[option.effect.axis - 1]))
 
     def best_of_starts(self, option: Hypothesis) -> Start:
-        """Return the candidate at the best of its own starts, and what it gains there.
+        """Return the candidate at the best of its start values, with its gain there.
 
-        A large effect bends the re-fitted simulator: these begin with one that is not re-fitted. Where none
-        of them gains anything with that, the re-fitted one was nearer the truth.
+        A large effect distorts the re-fit, so these starts use nominal own parameters. If no start gains anything with
+        these, the re-fitted ones are used.
         """
         first = self._scanned(option, {})
         return first if first.gain > 0 else self._scanned(option, self.model.robot_values)
 
     def _scanned(self, option: Hypothesis, robot_values: Mapping[str, float]) -> Start:
-        """Return it at the best value of its one number, for each of what starts have beside that."""
+        """Return the best start of a candidate with one free parameter, over all sets of its other start values."""
         name = option.free[0]
         kinds: dict[frozenset[tuple[str, float]], list[float]] = {}
         for start in option.starts:
@@ -263,7 +265,7 @@ class Screening:
     def _along(
         self, option: Hypothesis, begin: Sequence[float], robot_values: Mapping[str, float]
     ) -> Start:
-        """Return it at the best value of its one number, looked for among and between those to ``begin`` at."""
+        """Return the best start of a candidate with one free parameter, searched at ``begin`` and between."""
         name = option.free[0]
 
         def loss(value: float) -> float:
@@ -275,7 +277,7 @@ class Screening:
         at = int(np.argmin(losses))
         least, value = losses[at], values[at]
         if least < self.model.total:
-            # The valley is narrower than the steps between starts.
+            # The minimum is narrower than the distance between starts.
             between = (values[max(at - 1, 0)], values[min(at + 1, len(values) - 1)])
             finer = minimize_scalar(
                 loss,
@@ -289,14 +291,14 @@ class Screening:
 
 
 class CachedScreening(Screening):
-    """The screen of a model by what candidates did to the error of one before it."""
+    """Screening from the cached sensitivities of an earlier model, without simulation."""
 
     def __init__(self, bench: ScreeningModel, scale: float, more: float, kept: ColumnCache) -> None:
         super().__init__(bench, scale, more, kept)
         self._bordered = Bordered(self.model)
 
     def knows(self, option: Hypothesis) -> bool:
-        """Whether all that a candidate is screened by was kept."""
+        """Whether the cache has everything that the screening of a candidate needs."""
         scanned = bool(option.starts) and len(option.free) == 1
         wanted = [option, *self._at_starts(option)]
         known = all(self.kept.rows(o) is not None for o in wanted)
@@ -315,15 +317,15 @@ class CachedScreening(Screening):
 def thinned(
     bench: ScreeningModel, above: Array, layout: Layout, kept: ColumnCache | None = None
 ) -> Screening:
-    """Return the screen of a model on part of what a bench has: beginnings of the loudest logs.
+    """Return the screening of a model on part of the data: the logs with the largest error, or their first halves.
 
-    ``above`` (n_blocks,): loss above the floor; ``kept``: what models before it have left.
+    ``above`` (n_blocks,): loss above the floor; ``kept``: cache of sensitivities from earlier models.
     """
     logs = loudest_logs(above, layout, [] if kept is None else kept.logs)
     here = np.isin(layout.log, logs)
     part = bench if here.all() else ScreeningModel(bench.fitter.part(logs), bench.model.part(logs))
     first = here & _first_halves(layout)
-    begun = part.fitter.begun(part.model) if _tell(above, here, first, layout) else None
+    begun = part.fitter.begun(part.model) if _halves_suffice(above, here, first, layout) else None
     if begun is not None:
         part, here = ScreeningModel(*begun), first
     if kept is not None:
@@ -340,17 +342,18 @@ def _first_halves(layout: Layout) -> Mask:
     places = list(zip(layout.log.tolist(), layout.axis.tolist(), strict=True))
     left = {place: -(-count // 2) for place, count in Counter(places).items()}
     first = []
-    # Those of an axis of a log stand in the order of time.
+    # The blocks of one axis of a log are in the order of time.
     for place in places:
         first.append(left[place] > 0)
         left[place] -= 1
     return np.array(first)
 
 
-def _tell(above: Array, here: Mask, first: Mask, layout: Layout) -> bool:
-    """Whether the blocks ``first`` of those ``here`` have their part of what there is on every axis.
+def _halves_suffice(above: Array, here: Mask, first: Mask, layout: Layout) -> bool:
+    """Whether the first halves (``first``) of the logs in use (``here``) hold enough of the loss on every axis.
 
-    What opens, stalls or warms up late is not in them.
+    They miss an effect that shows late in a log, such as a stall or a warm-up. ``above`` (n_blocks,): loss above the
+    floor.
     """
     whole, part = (layout.by_axis(np.where(mask, above, 0.0)) for mask in (here, first))
     counts = whole > _SOMETHING * layout.by_axis(np.where(here, layout.counted, 0.0))
@@ -358,10 +361,10 @@ def _tell(above: Array, here: Mask, first: Mask, layout: Layout) -> bool:
 
 
 def loudest_logs(above: Array, layout: Layout, before: Sequence[int] = ()) -> list[int]:
-    """Return the logs to screen on: at least half of them, with most of what is to be explained.
+    """Return the logs to screen on: at least half of them, those with the largest loss above the floor.
 
-    ``above`` (n_blocks,): loss above the floor. Every axis counts alike. As many as run in
-    lock-step at the cost of fewer. Those of ``before`` where they have nearly as much.
+    The number is a multiple of the lock-step size, which costs no more. ``above`` (n_blocks,): loss above the floor;
+    every axis has the same weight. The logs ``before`` are kept if they hold nearly as much.
     """
     logs = np.unique(layout.log)
     count = _LOCK_STEP * -(-len(logs) // (2 * _LOCK_STEP))

@@ -1,4 +1,4 @@
-"""One round of a search: screen every candidate, fit the promising ones, refine the leaders."""
+"""One round of the search: screen every candidate, fit the promising ones, refine the leaders."""
 
 from __future__ import annotations
 
@@ -41,24 +41,26 @@ Progress = Callable[[str, int, int], None]
 A = TypeVar("A")
 B = TypeVar("B")
 
-# What is hopeless by what it did to a model before promises this much less again.
+# A hypothesis is skipped if its gain from cached sensitivities is below 0.3 of the screening threshold.
 _ROUGHLY = 0.3
-# Share of the best promise of all from which one is tried at once all the same: it may be the cause, and
-# the one found before its shadow on another axis.
+# A candidate does not wait if it promises this share of the best gain on the axis of the explaining effect. It may be
+# the true cause, and the effect found before may only imitate it on another axis.
 _AS_MUCH = 0.9
-# The same for an effect of the whole arm: of a load one step knows the mass alone, not where it is.
+# The same share for an effect of the whole arm. It is lower: one step of a payload finds its mass, not its place.
 _HALF_AS_MUCH = 0.5
 # Leaders of an axis that are refined.
 _REFINED = 2
-# So many are refined at once, whatever the number of threads: what they show decides on the next.
+# Leaders refined at the same time, whatever the number of threads: their results decide which come next.
 _AT_ONCE = 2
-# The same where the leader bends the simulator.
+# The same numbers where the leader bends the own parameters: leaders that are refined, and the share of the leader's
+# score that a rival needs.
 _REFINED_BENT = 4
 _FAR = 0.3
-# Steps on all data of a fit that was settled on part of them, where it is to be compared only.
+# Steps on all data for a fit that converged on part of the data and only needs to be compared.
 _LOOKS = 2
-# Share of a gain that another candidate may have on the same axis and not count as felt. Nothing gains
-# more than what is left: where one fitted elsewhere explains so much of that, what is tried there waits.
+# Coupling of two effects: share of a gain on an axis, or of the error there, above which another effect counts as
+# coupled. Candidates on an axis wait for the next round if an effect of another axis already explains more than this
+# share.
 _FELT = 0.2
 
 
@@ -74,24 +76,27 @@ def fresh(options: Sequence[Hypothesis], model: FittedModel, refused: set[str]) 
     ]
 
 
-def _as_much(start: Start) -> float:
-    """Return the share of the best promise from which a candidate is tried at once."""
+def _share_without_waiting(start: Start) -> float:
+    """Return the share of the best gain above which a candidate does not wait for the next round."""
     return _HALF_AS_MUCH if start.option.effect.axis is None else _AS_MUCH
 
 
-def _taken_away(found: FittedModel, model: FittedModel, axis: int) -> float:
-    """Return the share of a model's loss on an axis (from 0) that a fit on top of it takes away."""
+def _share_removed(found: FittedModel, model: FittedModel, axis: int) -> float:
+    """Return the share of a model's loss on an axis (from 0) that a fit with further effects removes."""
     before, after = (float(e.loss[e.axis == axis].sum()) for e in (model, found))
     return 1.0 - after / max(before, 1e-300)
 
 
 class SearchRound:
-    """Candidates on top of one model. Failures are kept in ``skipped`` with their reason.
+    """Candidates that are added to one model.
 
-    ``least`` (n_axes,): fall of the loss below which nothing is a cause; ``mends``: whether one only
-    mends a formula of the model; ``offered``: candidates for what is left of a model; ``kept``: what
-    candidates did to models before, and will have done to this; ``sensitivities`` by label, of
-    candidates that were screened.
+    - ``least`` (n_axes,): smallest fall of the loss for a cause.
+    - ``mends``: whether a trial only corrects the formula of a cause in the model.
+    - ``offered``: returns candidates for the residual of a model.
+    - ``kept``: cache of the candidates' sensitivities, from earlier models and for later ones.
+    - ``sensitivities``: by label, of the candidates that were screened.
+    - ``skipped``: candidates that failed, with the reason.
+    - ``waiting``: candidates that wait for the next round.
     """
 
     def __init__(
@@ -114,20 +119,20 @@ class SearchRound:
         self.bench = ScreeningModel(fitter, model)
         self.screen = Screening(self.bench)
         self.waiting: list[Start] = []
-        # Labels of candidates that began where a leader ended, and of those refined.
+        # Labels of the look-alikes that started from a leader's fit, and of the refined candidates.
         self.usual: set[str] = set()
         self.done: set[str] = set()
         self.sensitivities: dict[str, Sensitivity] = {}
 
     @property
     def rough(self) -> ModelFitter | None:
-        """The fitter for the part of the data that candidates are screened on; None where that is all."""
+        """The fitter for the part of the data that candidates are screened on; None if that is all data."""
         part = self.screen.bench
         return None if part is self.bench else part.fitter
 
     @property
     def screened(self) -> FittedModel:
-        """The model as the part of the data has it that candidates are screened on."""
+        """The model on the part of the data that candidates are screened on."""
         return self.screen.model
 
     @property
@@ -136,21 +141,21 @@ class SearchRound:
         return self.bench.skipped
 
     def run(self, options: Sequence[Hypothesis], number: int) -> list[FittedHypothesis]:
-        """Screen all candidates by one linear step, fit the promising ones in full."""
+        """Screen all candidates by one linear step, then fit the promising ones in full."""
         chosen = promising(self._screened(options, number), self._worth())
         tryout = TrialFit(self.bench, self.screen)
         if any(tryout.bends(start) for start in chosen):
             self.bench.begin_nominal()
         with self._threads() as pool:
             found = self._fitted_by_place(pool, chosen, f"fitting candidates, round {number}")
-            return self._with_usual(pool, found, options)
+            return self._with_look_alikes(pool, found, options)
 
     def _screened(self, options: Sequence[Hypothesis], number: int) -> list[Start]:
         screen = thinned(self.bench, self.current - self.floor, self.layout, self.kept)
         self.screen = screen
         if any(option.starts and len(option.free) == 1 for option in options):
             screen.bench.begin_nominal()
-        rough = self._by_kept(screen, options)
+        rough = self._hopeless_by_cache(screen, options)
         label = f"screening candidates, round {number}"
         todo = screen.groups([o for o in options if o.effect.label not in rough])
         with self._threads() as pool:
@@ -161,8 +166,10 @@ class SearchRound:
         self.sensitivities = {s.option.effect.label: s for s in known if s is not None}
         return starts
 
-    def _by_kept(self, screen: Screening, options: Sequence[Hypothesis]) -> dict[str, Start]:
-        """Return the candidates, by label, that what they did to a model before shows to be hopeless."""
+    def _hopeless_by_cache(
+        self, screen: Screening, options: Sequence[Hypothesis]
+    ) -> dict[str, Start]:
+        """Return the candidates, by label, whose gain from cached sensitivities is too small to screen them again."""
         if not self.kept.logs:
             return {}
         kept = screen.from_kept()
@@ -176,13 +183,13 @@ class SearchRound:
             or (s.falls is not None and np.all(s.falls < worth))
         }
 
-    def _with_usual(
+    def _with_look_alikes(
         self,
         pool: ThreadPoolExecutor,
         trials: list[FittedHypothesis],
         options: Sequence[Hypothesis],
     ) -> list[FittedHypothesis]:
-        """Add what is more usual than the leader of an axis and may have begun too far off."""
+        """Add common look-alikes of the leaders, whose own start values may have been too far off."""
         tried = {t.label for t in trials}
         begun = [
             start
@@ -193,38 +200,38 @@ class SearchRound:
         self.usual |= {start.option.effect.label for start in begun}
         return [*trials, *self._fitted(pool, begun)]
 
-    def _with_kin(
+    def _with_restarts(
         self,
         pool: ThreadPoolExecutor,
         trials: list[FittedHypothesis],
         options: Sequence[Hypothesis],
     ) -> list[FittedHypothesis]:
-        """Add what is like leaders and has to begin where they ended, or end where they did."""
+        """Add or replace hypotheses by restarts from the leaders' fits; see `Restarts`."""
         return Restarts(self, pool).added(trials, options)
 
     def looked_at(self, begun: FittedModel) -> FittedModel | Diverged:
-        """Return a fit to part of the data as all of them have it."""
+        """Return a fit to part of the data, evaluated on all of it."""
         found = self.fitter.fit(begun.free, begun, max_iterations=_LOOKS)
         if isinstance(found, Diverged):
             return found
-        # What is taken in is fitted on where it has not settled.
+        # Sensitivities of an unsettled fit do not count as its own. If it becomes a cause, it is fitted on.
         return replace(found, renewed=found.renewed and has_settled(found))
 
     def run_waiting(
         self, trials: list[FittedHypothesis], options: Sequence[Hypothesis], number: int
     ) -> list[FittedHypothesis]:
-        """Fit the candidates that were left to the next round too; return all trials."""
+        """Fit the candidates that were left to the next round; return all trials."""
         chosen, self.waiting = self.waiting, []
         if not chosen:
             return trials
         with self._threads() as pool:
-            found = self._with_usual(pool, [*trials, *self._fitted(pool, chosen)], options)
+            found = self._with_look_alikes(pool, [*trials, *self._fitted(pool, chosen)], options)
         self.progress(f"fitting further candidates, round {number}", len(chosen), len(chosen))
         return found
 
     @contextmanager
     def _threads(self) -> Iterator[ThreadPoolExecutor]:
-        """Yield threads; what they do is cancelled where the caller is interrupted."""
+        """Yield a pool of threads; its work is cancelled if the caller is interrupted."""
         with ThreadPoolExecutor(self.settings.threads) as pool:
             try:
                 yield pool
@@ -236,11 +243,11 @@ class SearchRound:
     def _fitted_by_place(
         self, pool: ThreadPoolExecutor, chosen: Sequence[Start], label: str
     ) -> list[FittedHypothesis]:
-        """Fit the chosen, place after place, the most promising first.
+        """Fit the chosen candidates axis by axis, the most promising axis first.
 
-        Where one found before explains enough of what is left on an axis, what is tried there is bound
-        to feel it and has to wait for the next round: it goes to ``waiting``, unless it promises as
-        much as any of that one's axis.
+        An earlier fit may already explain more than 20 % of the error on an axis. The other candidates of that axis are
+        coupled with it and go to ``waiting``, for the next round. Candidates with nearly the best gain on the axis of
+        that fit do not wait.
         """
         left = np.maximum(self.layout.by_axis(self.current - self.floor), 1e-12)
         most = best_by_axis(chosen, self.layout.n_axes)
@@ -253,8 +260,8 @@ class SearchRound:
                 felt = found[int(np.argmax(explained))].hypothesis.effect.axis
                 if explained.max() > _FELT:
                     bar = most.max() if felt is None else most[felt - 1]
-                    now = [s for s in here if s.gain > _as_much(s) * bar]
-                    self.waiting += [s for s in here if s.gain <= _as_much(s) * bar]
+                    now = [s for s in here if s.gain > _share_without_waiting(s) * bar]
+                    self.waiting += [s for s in here if s.gain <= _share_without_waiting(s) * bar]
             self.progress(label, done, len(chosen))
             found += self._fitted(pool, now)
             done += len(here)
@@ -262,9 +269,9 @@ class SearchRound:
         return found
 
     def _turns(self, chosen: Sequence[Start]) -> list[tuple[int | None, list[Start]]]:
-        """Return the axes of the chosen, the most promising first, each with what is tried there.
+        """Return the axes, the most promising first, each with the candidates that are fitted there.
 
-        An effect of the whole arm is tried at the first axis where it comes near the others.
+        An effect of the whole arm is fitted with the first axis where it comes near the best candidate.
         """
         best = best_by_axis(chosen, self.layout.n_axes)
         axes = {a for s in chosen if (a := s.option.effect.axis) is not None}
@@ -280,13 +287,13 @@ class SearchRound:
         return list(turns.items())
 
     def _fitted(self, pool: ThreadPoolExecutor, starts: Sequence[Start]) -> list[FittedHypothesis]:
-        """Fit candidates, on what the screen has of the data; look at them on all of it."""
+        """Return candidates fitted on the data of the screen and evaluated on all data; without those that diverge."""
         tryout = TrialFit(self.bench, self.screen)
         begun = pool.map(tryout.begun, starts)
         return [t for t in pool.map(tryout.ended, begun) if t is not None]
 
     def standings(self, trials: Sequence[FittedHypothesis]) -> list[AxisPosterior]:
-        """Return how the trials stand on each axis that one of them improves."""
+        """Return the posteriors of the trials, for each axis that one of them improves."""
         found = [
             stand(
                 trials,
@@ -309,11 +316,11 @@ class SearchRound:
         *,
         even_felt: bool = False,
     ) -> list[FittedHypothesis]:
-        """Fit the leaders of each axis again with the simulator's sensitivities renewed.
+        """Fit the leaders of each axis again with sensitivities of their own; return the trials with the new fits.
 
-        A large effect bends the re-fitted simulator, and the sensitivities taken from
-        it; the leaders deserve better before one of them is believed. Other laws of a gear that is one
-        begin where it ended.
+        A large effect distorts the re-fitted simulator, and with it the sensitivities that were taken there. So the
+        leaders are fitted again before one becomes a cause. ``even_felt``: refine leaders on axes that are coupled with
+        the strongest effect, too.
         """
         label = f"refining the leaders, round {number}"
         with self._threads() as pool:
@@ -325,25 +332,25 @@ class SearchRound:
                 better = dict(zip(map(id, todo), found, strict=True))
                 with_them = (better.get(id(t), t) for t in trials)
                 trials = [t for t in with_them if t is not None]
-            trials = self._with_kin(pool, trials, options)
+            trials = self._with_restarts(pool, trials, options)
         self.progress(label, 1, 1)
         return trials
 
     def _refined_next(
         self, trials: Sequence[FittedHypothesis], *, even_felt: bool
     ) -> list[FittedHypothesis]:
-        """Return the leaders to refine now: where one bends the simulator several, else mostly one.
+        """Return the leaders to refine next: two where a leader bends the own parameters, else one.
 
-        A leader with sensitivities of its own may no longer bend it.
+        Once a leader has sensitivities of its own, it may bend them no more.
         """
-        crooked = self._crooked(trials)
+        crooked = self._bent_axes(trials)
         todo = self._worth_refining(trials, crooked, even_felt=even_felt)
         return todo[: _AT_ONCE if crooked else 1]
 
     def _leader_before(
         self, one: FittedHypothesis, trials: Sequence[FittedHypothesis]
     ) -> FittedHypothesis | None:
-        """Return what leads on the axis of a trial; None for one that leads anywhere, or has no axis."""
+        """Return the leader on the axis of a trial; None if the trial leads any axis, or if its axis has no leader."""
         leaders = {s.axis: s.best.trial for s in self.standings(trials)}
         if any(leader is one for leader in leaders.values()):
             return None
@@ -352,22 +359,22 @@ class SearchRound:
     def _refined(
         self, one: FittedHypothesis, leader: FittedHypothesis | None
     ) -> FittedHypothesis | None:
-        """Return a trial with sensitivities of its own; None where it cannot be simulated with them.
+        """Return a trial fitted with sensitivities of its own; None if it diverges.
 
-        As it was where they leave it far behind its ``leader``.
+        The unchanged trial is returned if the new fit stays far behind that of ``leader``.
         """
-        fitted = self._compared(one.fitted, None if leader is None else leader.fitted)
+        fitted = self._comparable(one.fitted, None if leader is None else leader.fitted)
         if isinstance(fitted, Diverged):
             self.skipped[one.label] = str(fitted)
             return None
         return one if fitted is None else trial(one.hypothesis, fitted, self.model)
 
-    def _compared(
+    def _comparable(
         self, start: FittedModel, leader: FittedModel | None
     ) -> FittedModel | Diverged | None:
-        """Return a fit good enough to be compared: settled on part of the data, looked at on all.
+        """Return a fit that can be compared: converged on part of the data, then evaluated on all of it.
 
-        None where it stays far behind its ``leader`` on that part.
+        None if it stays far behind ``leader`` on that part.
         """
         if self.rough is None or start.renewed:
             return settled(self.fitter, start.free, start)
@@ -376,35 +383,38 @@ class SearchRound:
             return begun
         axis = start.free[-1].effect.axis
         if leader is not None and axis is not None:
-            needed = CLOSE * _taken_away(leader, self.model, axis - 1)
-            if _taken_away(begun, self.screen.model, axis - 1) < needed:
+            needed = CLOSE * _share_removed(leader, self.model, axis - 1)
+            if _share_removed(begun, self.screen.model, axis - 1) < needed:
                 return None
         return self.looked_at(begun)
 
-    def _crooked(self, trials: Sequence[FittedHypothesis]) -> set[int]:
-        """Return the axes (from 0) whose leader bends the simulator: its rivals were tried on a bent one."""
+    def _bent_axes(self, trials: Sequence[FittedHypothesis]) -> set[int]:
+        """Return the axes (from 0) whose leader bends the own parameters.
+
+        The fits of its rivals there used distorted sensitivities.
+        """
         leaders = ((s.axis, s.best.trial.fitted) for s in self.standings(trials))
         return {axis for axis, fitted in leaders if bent(self.fitter, fitted) >= BENT}
 
     def _worth_refining(
         self, trials: Sequence[FittedHypothesis], crooked: set[int], *, even_felt: bool
     ) -> list[FittedHypothesis]:
-        """Return the leaders that explain anything, not done yet, where it is not clear which leads.
+        """Return the leaders, and close rivals, that are not refined yet, on axes where the best one is not clear.
 
-        An effect is judged on its own axis: how it fares on others says little of what it would be
-        with the simulator's sensitivities its own. Unless it leads there: on others it is held against
-        rivals that were refined.
+        An effect is refined on its own axis, or on an axis that it leads. Its score on other axes says little:
+        sensitivities of its own change it there. Axes are left out where candidates wait, or where the leader gains too
+        little for a cause.
         """
         out = []
         standings = self.standings(trials)
         leaders = {s.best.trial.label for s in standings}
         led: dict[int | None, str] = {s.axis + 1: s.best.trial.label for s in standings}
         homes = {s.best.trial.label: s.best.trial.hypothesis.effect.axis for s in standings}
-        # Axes that another law of theirs leads, on another axis.
+        # Axes of an effect that leads another axis, while something else leads its own.
         away = {home for label, home in homes.items() if led.get(home, label) != label}
-        # Where candidates wait, what leads has had no rivals.
+        # On axes with waiting candidates, the leader has not met its rivals yet.
         wait = {start.option.effect.axis for start in self.waiting}
-        for standing in standings if even_felt else self._not_felt(standings, trials):
+        for standing in standings if even_felt else self._not_coupled(standings, trials):
             if standing.axis + 1 in wait:
                 continue
             leader = standing.best
@@ -413,12 +423,14 @@ class SearchRound:
                 continue
             bends = standing.axis in crooked
             count, close = (_REFINED_BENT, _FAR) if bends else (_REFINED, CLOSE)
-            # What is more usual than the leader is it at its limits, until its own fit says no.
+            # A law with a parameter at its bound may equal a common look-alike. Only the look-alike's own fit can rule
+            # that out.
             special = more_usual(leader.trial) if ended_at_bound(leader.trial) else set()
             usual = self.usual | more_usual(leader.trial)
             rivals = standing.ranked[:count]
             if clear(standing) and not bends:
-                # What leads elsewhere, and is fitted there, is held against one that is fitted as well.
+                # An effect of this axis leads elsewhere with a refined fit. Refine the leader here before the two are
+                # compared.
                 rivals = rivals[:1] if standing.axis + 1 in away else ()
             usual |= {r.trial.label for r in as_good_with_less(standing)}
             usual |= {r.trial.label for r in of_one_formula(standing)}
@@ -430,18 +442,19 @@ class SearchRound:
                 here = place in (None, standing.axis + 1) or label in leaders
                 share = _FAR if label in usual else close
                 near = r.score > max(0.5 * self.settings.smallest_score, share * leader.score)
-                # A law at its limits may be the usual one, however badly that was fitted.
+                # A law at its bound may be the common look-alike, however poor the fit of that was.
                 near = near or label in special
                 if here and near and label not in self.done and r.trial not in out:
                     out.append(r.trial)
         return out
 
-    def _not_felt(
+    def _not_coupled(
         self, standings: Sequence[AxisPosterior], trials: Sequence[FittedHypothesis]
     ) -> Sequence[AxisPosterior]:
-        """Return the standings but those whose leaders the one that gains most of all is felt by.
+        """Return the posteriors without those whose leader is coupled with the effect that gains most in total.
 
-        They are judged in the next round, on top of it; but for its own axis, where it has to lead.
+        These wait for the next round, when that effect is in the model. The effect's own axis stays: it must lead
+        there.
         """
         fall = falls(trials, self.current, self.layout)
         place = {t.label: i for i, t in enumerate(trials)}
@@ -455,13 +468,13 @@ class SearchRound:
         ]
 
     def first(self, standings: Sequence[AxisPosterior], trials: Sequence[FittedHypothesis]) -> str:
-        """Return the label of the leader that gains most of all; empty where nothing leads."""
+        """Return the label of the leader that gains most over all axes; empty if no axis has a leader."""
         fall = falls(trials, self.current, self.layout).sum(axis=1)
         gain = {t.label: float(f) for t, f in zip(trials, fall, strict=True)}
         return max((s.best.trial.label for s in standings), key=gain.__getitem__, default="")
 
     def _worth(self) -> Array:
-        """Return the fall of the loss of each axis (n_axes,) that a cause there has to be worth."""
+        """Return the smallest fall of the loss of each axis (n_axes,) for a cause there."""
         left = np.maximum(self.layout.by_axis(self.current - self.floor), 0.0)
         return np.asarray(np.maximum(self.least, self.settings.smallest_score * left))
 
@@ -476,8 +489,8 @@ class SearchRound:
 
 
 def interact(one: int, other: int, axis: int, fall: Array) -> bool:
-    """Whether trial ``one``, taken in, would change what ``other`` gains on ``axis``.
+    """Whether adding trial ``one`` to the model would change the gain of trial ``other`` on ``axis`` (from 0).
 
-    ``fall`` (n_trials, n_axes): what each lowers the loss by.
+    ``fall`` (n_trials, n_axes): fall of the loss by each trial.
     """
     return bool(abs(fall[one, axis]) > _FELT * abs(fall[other, axis]))

@@ -17,7 +17,7 @@ from axisight.gap.screening.screening import (
     Screening,
     ScreeningModel,
     _first_halves,
-    _tell,
+    _halves_suffice,
     loudest_logs,
     thinned,
 )
@@ -452,12 +452,12 @@ def test_beginnings_do_only_where_they_have_their_part_of_every_axis():
     first = _first_halves(layout)
     np.testing.assert_array_equal(first, block < 5)
     even = np.full(len(log), 1e4)
-    assert _tell(even, here, first, layout)
+    assert _halves_suffice(even, here, first, layout)
     late = np.where((axis == 1) & (block < 8), 100.0, even)
-    assert not _tell(late, here, first, layout)
+    assert not _halves_suffice(late, here, first, layout)
     # An axis that has nothing has no say.
     nothing = np.where(axis == 1, np.where(block < 8, 0.0, 10.0), even)
-    assert _tell(nothing, here, first, layout)
+    assert _halves_suffice(nothing, here, first, layout)
 
 
 def turns_of(losses: Sequence[float]) -> int:

@@ -189,7 +189,7 @@ def test_a_rival_left_far_behind_on_part_of_the_data_is_not_looked_at_on_all(
         fitter=whole,
     )
     field.looked_at = partial(SearchRound.looked_at, field)
-    found = SearchRound._compared(field, fit_of("none"), fit_of("leader"))
+    found = SearchRound._comparable(field, fit_of("none"), fit_of("leader"))
     assert (found is not None) == looked_at == bool(looked)
     # A leader is looked at, however little it takes away.
-    assert SearchRound._compared(field, fit_of("none"), None) is not None
+    assert SearchRound._comparable(field, fit_of("none"), None) is not None

@@ -134,11 +134,11 @@ def test_what_feels_the_first_waits_for_the_next_round(monkeypatch):
     field.first = partial(SearchRound.first, field)
     assert field.first([], TRIED) == ""
     assert field.first([led(0), led(1), led(2)], TRIED) == "cube@3"
-    kept = SearchRound._not_felt(field, [led(0), led(1), led(2)], TRIED)
+    kept = SearchRound._not_coupled(field, [led(0), led(1), led(2)], TRIED)
     assert [s.axis for s in kept] == [1, 2]
     # One of axis 1 that gains most, on axis 3: its rival at home is judged now.
     monkeypatch.setitem(vars(TRIED[0].hypothesis), "effect", Effect("viscous_friction", 1))
-    kept = SearchRound._not_felt(field, [led(0), led(1), led(2)], TRIED)
+    kept = SearchRound._not_coupled(field, [led(0), led(1), led(2)], TRIED)
     assert [s.axis for s in kept] == [0, 1, 2]
 
 

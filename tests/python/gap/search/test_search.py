@@ -113,7 +113,7 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
     other.fitted = SimpleNamespace(free=(1,))
 
     class Field(Round):
-        def _crooked(self, trials):
+        def _bent_axes(self, trials):
             return set()
 
         def _leader_before(self, one, trials):
@@ -122,7 +122,7 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
         def _worth_refining(self, trials, crooked, *, even_felt):
             return [t for t in trials if t.label not in self.done]
 
-        def _with_kin(self, pool, trials, options):
+        def _with_restarts(self, pool, trials, options):
             return trials
 
     def settled(fitter, free_, start):
