@@ -1,1 +1,1 @@
-"""Fits of a simulator with effects to logs, and what the normal equations tell of them."""
+"""Fits of a simulator with effects to logs, and what follows from their normal equations."""

@@ -1,10 +1,11 @@
-"""How sure the size of an effect is: what re-fits without each stretch of time make of it.
+"""Significance of the size of an effect, from re-fits that leave out one stretch of time each.
 
-An effect may show in a few stretches only, as viscous friction does in the fast ones. Its gain is
-then uneven, and no test of the gain can be sure of it; but those stretches may agree on its size.
-The delete-one-group jackknife says how well: it needs no white residuals, and a size that hangs on
-one stretch goes away with it (Efron 1982, *The Jackknife, the Bootstrap and Other Resampling Plans*,
-chapter 3; Hotelling's T^2 for several sizes).
+An effect may show in a few stretches only: viscous friction shows in the fast ones. Its gain is then uneven, and a test
+of the gain is never sure. But if those stretches agree on its size, the effect is there.
+
+The delete-one-group jackknife measures this agreement. It needs no white residuals, and a size that depends on one
+stretch vanishes without it (Efron 1982, *The Jackknife, the Bootstrap and Other Resampling Plans*, chapter 3;
+Hotelling's T^2 for several sizes).
 """
 
 from __future__ import annotations
@@ -22,17 +23,17 @@ Array = NDArray[np.float64]
 
 
 def amplitude_significance(fitted: FittedModel, stretch: NDArray[np.int64]) -> float:
-    """Return how sure the amplitudes of the last effect are not the simulator's, as a normal deviate.
+    """Return how surely the last effect's amplitudes differ from the simulator's [standard deviations of a normal].
 
-    ``stretch`` (n_blocks,): the stretch of time of each block. Zero without an effect, for one
-    whose neutral values are not zero, and where fewer stretches than amplitudes fix them.
+    ``stretch`` (n_blocks,): the stretch of time of each block. Zero without an effect, for amplitudes whose neutral
+    value is not zero, and if the stretches are too few for the number of amplitudes.
     """
     columns = _amplitudes(fitted)
     groups = np.unique(stretch)
     if not columns or len(groups) < 2:
         return 0.0
     moved = np.array([step_without(fitted, stretch == g)[columns] for g in groups])
-    # One that no stretch moves is held next to a bound, as those on one are left out.
+    # An amplitude that no re-fit moves is next to a bound. It is left out, like those on a bound.
     free = np.any(moved != 0.0, axis=0)
     if not free.any():
         return 0.0
@@ -41,22 +42,22 @@ def amplitude_significance(fitted: FittedModel, stretch: NDArray[np.int64]) -> f
     scatter = (len(groups) - 1) / len(groups) * moved.T @ moved
     freedom = min(_freedom(fitted, stretch, columns), len(groups) - 1)
     left = freedom - len(columns) + 1
-    # With fewer than two to spare, one stretch may be all there is.
+    # With fewer than two spare degrees of freedom, a single stretch could decide.
     if left < 2:
         return 0.0
     scale = np.sqrt(np.maximum(np.diag(scatter), 1e-300))
-    # As good as singular where two amplitudes are one: the ridge then takes them as one.
+    # Two amplitudes of the same shape make the matrix nearly singular. The ridge treats them as one.
     normal = scatter / np.outer(scale, scale) + 1e-9 * np.eye(len(columns))
     square = float((size / scale) @ np.linalg.solve(normal, size / scale))
     tail = log_fisher_tail(square * left / (freedom * len(columns)), len(columns), left)
-    # Of a single size both signs are in the tail; a normal deviate has one.
+    # The tail of a single size holds both signs, a normal deviate only one. Values above 37 exceed floating point.
     return max(0.0, float(-scipy.special.ndtri_exp(tail))) if tail > -700 else 37.0
 
 
 def _amplitudes(fitted: FittedModel) -> list[int]:
-    """Return the columns of the last effect's amplitudes, those on a bound left out.
+    """Return the columns of the last effect's amplitudes, without those on a bound.
 
-    None where its shape was chosen from among many, as orders are: the best of them has a size in
+    Empty if the shape of the effect was chosen from many, such as a ripple order: the best of many shapes has a size in
     any noise.
     """
     last = len(fitted.effects) - 1
@@ -74,21 +75,21 @@ def _amplitudes(fitted: FittedModel) -> list[int]:
 
 
 def _change(fitted: FittedModel, column: int) -> float:
-    """Return by how much an amplitude differs from what the simulator has, mostly nothing."""
+    """Return the difference between a fitted amplitude and the value that the simulator states, zero by default."""
     name = fitted.parameters[column][1]
     stated = fitted.free[-1].stated.get(name, 0.0)
     return float((fitted.effects[-1].parameters or {})[name]) - stated
 
 
 def _freedom(fitted: FittedModel, stretch: NDArray[np.int64], columns: list[int]) -> float:
-    """Return degrees of freedom of the scatter: how many stretches share the information.
+    """Return the degrees of freedom of the scatter: the number of stretches that share the information.
 
-    Satterthwaite's: the squares that add up to the variance have the shares that white residuals
-    would give them. The least of all amplitudes.
+    Satterthwaite's formula, with the shares of the variance that white residuals would give. The smallest over all
+    amplitudes.
     """
     matrix = fitted.matrix.sum(axis=0) + fitted.prior_matrix
     size = np.sqrt(np.diag(matrix))
-    # What has no influence has no share either.
+    # A parameter without influence has no share.
     scale = np.divide(1.0, size, out=np.zeros_like(size), where=size > 1e-100)
     normal = matrix * np.outer(scale, scale) + 1e-9 * np.eye(len(matrix))
     pull = np.linalg.solve(normal, np.diag(scale)[:, columns]) * scale[:, None]

@@ -1,4 +1,4 @@
-"""Losses of data blocks summed by axis and by stretch of time, and how sure their fall is."""
+"""Sums the losses of data blocks by axis and by stretch of time, and tests how sure a fall of the loss is."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from axisight.statistics.tails import log_student_tail
 
 Array = NDArray[np.float64]
 
-# Stretches of all logs together, where they are long enough: with fewer, a mean has to lie too
-# many of its own standard errors from zero to be believed.
+# Stretches of all logs together, if the logs are long enough. With fewer, a mean must be too many standard errors from
+# zero to be significant.
 _STRETCHES = 16
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the blocks of a problem lie: ``axis`` from 0, ``stretch``, ``log``, each (n_blocks,).
+    """Axis, stretch and log of each data block of a problem.
 
-    ``counted`` (n_blocks,): what the residuals of a block count for in all.
+    ``axis`` (from 0), ``stretch``, ``log``: (n_blocks,) each. ``counted`` (n_blocks,): total weight of the residuals of
+    a block, their number if no sample has less weight.
 
-    A stretch is a piece of time of one log, all axes: what happens then on one axis and on
-    another is not independent.
+    A stretch is a piece of time of one log with all axes, because events on two axes at one time are not independent.
     """
 
     axis: NDArray[np.int64]
@@ -39,7 +39,7 @@ class Layout:
         return int(self.axis.max()) + 1
 
     def of(self, axis: int | None) -> NDArray[np.bool_]:
-        """Return which blocks (n_blocks,) are of an axis (from 0); all where that is None."""
+        """Return which blocks (n_blocks,) belong to an axis (from 0); all if it is None."""
         return np.ones(len(self.axis), dtype=bool) if axis is None else self.axis == axis
 
     def by_axis(self, values: Array) -> Array:
@@ -47,17 +47,17 @@ class Layout:
         return np.asarray(np.bincount(self.axis, values, minlength=self.n_axes), np.float64)
 
     def samples(self) -> Array:
-        """Return what the residuals of each axis count for (n_axes,): their number where all are one."""
+        """Return the total weight of the residuals of each axis (n_axes,): their number if all weights are one."""
         return self.by_axis(self.counted)
 
     def significance(self, before: Array, after: Array, axis: int | None = None) -> float:
-        """Return how sure a fall of loss by block is, in standard deviations of a normal.
+        """Return how sure a fall of loss by block (n_blocks,) is, in standard deviations of a normal.
 
-        The fall is summed over the axes (or one ``axis``, from 0) within each stretch of time and
-        compared with its scatter between the stretches of a log: that one log shows an effect
-        and another does not is no doubt of it. An effect may show in a few loud stretches only,
-        or be drowned by one: the plain sums and those relative to the loss of their stretch are
-        both tried, and the larger counts.
+        The fall is summed over the axes, or one ``axis`` (from 0), in each stretch of time. It is compared with its
+        scatter between the stretches of one log: an effect that shows in one log only is no less sure.
+
+        An effect may show in a few loud stretches only, or one loud stretch may hide it. So the test is made with
+        absolute falls and with falls relative to the loss of each stretch, and the larger value counts.
         """
         used = np.ones(len(before), bool) if axis is None else self.axis == axis
         _, first, stretches = np.unique(self.stretch[used], return_index=True, return_inverse=True)
@@ -70,10 +70,10 @@ class Layout:
 
 
 def layout_of(fitted: FittedModel) -> Layout:
-    """Return where the blocks of a fitted model lie.
+    """Return axis, stretch and log of the blocks of a fitted model.
 
-    The stretches of a log count for as much each: one in which every axis stands would say nothing,
-    and nothing is no scatter.
+    The stretches of a log have equal weight. A stretch in which every axis stands still would add a fall of zero and
+    understate the scatter.
     """
     stretch = np.zeros(len(fitted.log), dtype=np.int64)
     logs = np.unique(fitted.log)
@@ -84,7 +84,7 @@ def layout_of(fitted: FittedModel) -> Layout:
         for axis in np.unique(fitted.axis[fitted.log == log]):
             rows = np.flatnonzero((fitted.log == log) & (fitted.axis == axis))
             by_axis.append(rows[np.argsort(fitted.start[rows], kind="stable")])
-        # Blocks of all axes lie at the same times.
+        # The blocks of all axes lie at the same times.
         counted = np.sum([fitted.samples[rows] for rows in by_axis], axis=0)
         numbers = _even_parts(counted, min(wanted, len(counted)))
         for rows in by_axis:
@@ -94,7 +94,7 @@ def layout_of(fitted: FittedModel) -> Layout:
 
 
 def _even_parts(counted: Array, count: int) -> NDArray[np.int64]:
-    """Return which of ``count`` parts each block (n,) lies in, parts that count for as much."""
+    """Return which of ``count`` parts of about equal weight each block (n,) lies in."""
     total = np.cumsum(counted)
     middle = (total - 0.5 * counted) / max(float(total[-1]), 1e-300)
     return np.minimum((count * middle).astype(np.int64), count - 1)
@@ -103,9 +103,9 @@ def _even_parts(counted: Array, count: int) -> NDArray[np.int64]:
 def _standard_errors(x: Array, logs: NDArray[np.int64]) -> float:
     """Return the mean over its standard error, as the normal deviate of equal probability.
 
-    The standard error of a stratified mean: scatter within each log, pooled.
+    The standard error is that of a stratified mean, from the pooled scatter within each log.
     """
-    # A simulation that diverges leaves what has no square.
+    # A diverging simulation leaves values whose square overflows.
     x = x / max(float(np.abs(x).max()), 1e-300)
     own = [x[logs == log] for log in np.unique(logs)]
     if max(len(part) for part in own) < 2:
@@ -116,6 +116,6 @@ def _standard_errors(x: Array, logs: NDArray[np.int64]) -> float:
     pooled = sum(float(((part - part.mean()) ** 2).sum()) for part in own) / freedom
     mean = float(x.mean())
     t = mean / max(float(np.sqrt(pooled / len(x))), 1e-12 * abs(mean), 1e-300)
-    # The scatter is known from these few only; beyond what floating point holds, it is sure.
+    # Student's distribution, since few stretches give the scatter. Values above 37 exceed floating point.
     tail = log_student_tail(t, freedom)
     return float(-scipy.special.ndtri_exp(tail)) if tail > -700 else 37.0

@@ -1,4 +1,4 @@
-"""Effects under trial, and what the data say of a model with them."""
+"""Hypotheses, and the normal equations and fits of models with them."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """An effect under trial: start values, the parameters to fit, priors and bounds of some.
+    """An effect that is tried: its start values, free parameters, priors and bounds.
 
-    ``starts`` are further start values worth trying, of one parameter, for effects whose fit may
-    end in the wrong valley. ``stated`` are the values of an effect that the simulator has itself.
-    ``deflections_rad``: from where to where the torques of the logs turn a linear gear, for laws of gears.
+    - ``priors``: mean and standard deviation by parameter; ``bounds``: smallest and largest value.
+    - ``starts``: further start values, since a fit may end in a local minimum.
+    - ``stated``: values of the effect that the simulator already has.
+    - ``deflections_rad``: range in which the torques of the logs turn a linear gear, for gear laws.
     """
 
     effect: Effect
@@ -32,26 +33,27 @@ class Hypothesis:
     deflections_rad: tuple[float, float] | None = None
 
     def at(self, values: Mapping[str, float]) -> Hypothesis:
-        """Return the same with other start values."""
+        """Return the hypothesis with other start values."""
         return replace(self, effect=self.effect.with_values(values))
 
     def limits(self, name: str) -> tuple[float, float]:
-        """Return the least and the largest value of a parameter: beyond those of the effect there is no model."""
+        """Return the smallest and the largest value of a parameter, always within the bounds of the effect."""
         table = next(p for p in effect_info(self.effect.name).parameters if p.name == name)
         least, most = self.bounds.get(name, (table.lower, table.upper))
         return max(least, table.lower), min(most, table.upper)
 
 
-# One of them is itself alone: what is computed of it is kept by it.
+# Compared by identity, so that results can be cached by object.
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
-    """Normal equations of a model at given parameters.
+    """Normal equations of a model at given parameters, by data block (see `FittedModel`).
 
-    By block (see `Fitted`): ``matrix`` (n_blocks, p, p), ``gradient`` (n_blocks, p),
-    ``loss`` (n_blocks,); ``prior_matrix`` (p, p), ``prior_gradient`` (p,). ``parameters``
-    names the p columns: (None, robot parameter) or (effect position, parameter); ``jacobian`` has
-    them, of a model that was not fitted. ``room``: how far down and up those of effects may go
-    from where they are, as far as that is known.
+    - ``matrix`` (n_blocks, p, p), ``gradient`` (n_blocks, p), ``loss`` (n_blocks,).
+    - ``prior_matrix`` (p, p), ``prior_gradient`` (p,).
+    - ``parameters``: names of the p columns: (None, robot parameter) or (position of the effect, parameter).
+    - ``at_bound``: the parameters at a bound.
+    - ``jacobian``: the p columns of a model that was evaluated and not fitted.
+    - ``room``: how far down and up effect parameters may move from their values, if known.
     """
 
     parameters: tuple[tuple[int | None, str], ...]
@@ -72,9 +74,9 @@ class NormalEquations:
         return float(self.loss.sum())
 
     def without(self, kept: int, *, among: range, fixed: set[str]) -> NormalEquations:
-        """Return the same with one effect of those at the places ``among``, which comes first there.
+        """Return the normal equations with only one effect, number ``kept``, of the effects at the positions ``among``.
 
-        ``fixed``: the robot's parameters that are no longer free.
+        It moves to the first of these positions. ``fixed``: robot parameters that are no longer free.
         """
         wanted = [
             i
@@ -102,14 +104,15 @@ class NormalEquations:
 
 @dataclass(frozen=True, eq=False)
 class FittedModel(NormalEquations):
-    """A fitted model and what the data say of it.
+    """A fitted model with its normal equations and residuals.
 
-    ``robot_values``: the simulator's re-fitted parameters; ``effects`` with
-    fitted values and ``std`` per effect parameter; ``log``, ``axis``, ``start``,
-    ``size`` (n_blocks,) of the blocks, ``samples`` (n_blocks,) what their residuals count for in
-    all: fewer where some are weighed down. ``renewed``: the sensitivities are the model's own,
-    none is another's; ``up_to_date``: all of them were computed where the fit ended. ``balanced``:
-    parameters at a bound where the values are those of a balanced fit, and the rest is of this one.
+    - ``effects``: with fitted values; ``free``: the hypotheses that they come from; ``robot_values``: own parameters.
+    - ``std``: standard deviation by parameter; ``condition``: condition number of the normal equations.
+    - ``log``, ``axis``, ``start``, ``size`` (n_blocks,): log, axis, first residual and length of each block.
+    - ``samples`` (n_blocks,): total weight of the residuals of a block, less than ``size`` if some weigh less.
+    - ``residual`` (n_residuals,) and ``columns``, its derivatives by (effect label or None, parameter).
+    - ``renewed``: all sensitivities were computed for this model; ``up_to_date``: at the values where the fit ended.
+    - ``balanced``: parameters at a bound in a balanced fit, if the values come from one; all else is from this fit.
     """
 
     effects: tuple[Effect, ...]
@@ -135,7 +138,7 @@ class FittedModel(NormalEquations):
         return self.at_bound if self.balanced is None else self.balanced
 
     def part(self, logs: Sequence[int]) -> FittedModel:
-        """Return the same of some logs, by their numbers; what was fitted stays."""
+        """Return the model with the data of some logs (numbers) only; fitted values stay."""
         kept = np.isin(self.log, logs)
         first, size = self.start[kept], self.size[kept]
         rows = list(zip(first.tolist(), (first + size).tolist(), strict=True))
@@ -154,7 +157,7 @@ class FittedModel(NormalEquations):
         )
 
     def ending_with(self, last: Hypothesis) -> FittedModel:
-        """Return the same with one of its effects last: what is under trial stands there."""
+        """Return the model with one of its effects moved to the end, where the hypothesis under test stands."""
         at = next(i for i, f in enumerate(self.free) if f.effect.label == last.effect.label)
         order = [i for i in range(len(self.free)) if i != at] + [at]
         place = {old: new for new, old in enumerate(order)}
@@ -181,5 +184,5 @@ class FittedModel(NormalEquations):
 
     @property
     def stuck(self) -> bool:
-        """Whether no step lowers the loss, whatever its sensitivities promise: another fit ends here too."""
+        """Whether the fit stalled although its sensitivities are up to date: a further fit would end here, too."""
         return self.status == "stalled" and self.up_to_date

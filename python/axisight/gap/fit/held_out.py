@@ -1,4 +1,4 @@
-"""Held-out scores of fitted models, from the normal equations of their data blocks."""
+"""Held-out losses and linear steps of fitted models, from the normal equations of their data blocks."""
 
 from __future__ import annotations
 
@@ -17,14 +17,12 @@ Array = NDArray[np.float64]
 def held_out_loss(fitted: FittedModel, like: FittedModel | None = None) -> Array:
     """Return the loss of every block (n_blocks,) predicted without its own log.
 
-    Each log in turn is left out, the parameters are re-estimated on the others
-    (one Gauss-Newton step from the common fit, exact for a model linear in its
-    parameters), and its blocks are scored. With a single log, its blocks are
-    left out in five interleaved groups instead.
+    Each log in turn is left out. The parameters are re-estimated on the others by one Gauss-Newton step from the common
+    fit, which is exact for linear parameters, and the blocks of the log are scored. The blocks of a single log are left
+    out in five interleaved groups.
 
-    A log that alone tells of an effect is left out in stretches: what others make of it is no more
-    than their noise. So it is of a model that is compared with one of ``like``, a fit to the same data with
-    that effect: the log may be alone with a parameter of the simulator, too.
+    A log that alone determines an effect is left out in stretches of time: the other logs would only fit noise. A model
+    that is compared with a fit ``like`` of the same data uses the groups of ``like``.
     """
     kept = _KEPT.setdefault(fitted, WeakKeyDictionary())
     like = fitted if like is None else like
@@ -34,12 +32,12 @@ def held_out_loss(fitted: FittedModel, like: FittedModel | None = None) -> Array
     return known
 
 
-# Held-out losses of models by what their logs are left out like: a search asks for them again and again.
+# Cache of held-out losses, by model and by the model whose groups were used; the search asks for them repeatedly.
 _KEPT: WeakKeyDictionary[FittedModel, WeakKeyDictionary[FittedModel, Array]] = WeakKeyDictionary()
 
 
 def _held_out_loss(fitted: FittedModel, groups: NDArray[np.int64]) -> Array:
-    """Return the loss of every block (n_blocks,) predicted without its group; not to be written to."""
+    """Return the loss of every block (n_blocks,) predicted without its group, as a read-only array."""
     out = np.zeros(len(fitted.loss))
     for group in np.unique(groups):
         inside = groups == group
@@ -49,32 +47,32 @@ def _held_out_loss(fitted: FittedModel, groups: NDArray[np.int64]) -> Array:
     return out
 
 
-# Share of what all logs tell of an effect's parameter from which a log is alone with it.
+# Share of the information of all logs on an effect's parameter from which one log counts as its only source.
 _ALONE = 0.9
-# Stretches of time of such a log.
+# Stretches of time in which such a log is left out.
 _STRETCHES = 4
-# Groups of a single log.
+# Interleaved groups of a single log.
 _INTERLEAVED = 5
 
 
 def _groups(fitted: FittedModel) -> NDArray[np.int64]:
-    """Return the number of the group (n_blocks,) that each block is left out with."""
+    """Return the number of the group (n_blocks,) with which each block is left out."""
     logs, number = np.unique(fitted.log, return_inverse=True)
     if len(logs) == 1:
         return np.arange(len(number)) % _INTERLEAVED
     groups = number * _STRETCHES
     for log in _alone(fitted, number):
         for axis in np.unique(fitted.axis):
-            # Blocks of an axis of a log stand in the order of time.
+            # The blocks of one axis of a log are in the order of time.
             here = np.flatnonzero((number == log) & (fitted.axis == axis))
             groups[here] += np.arange(len(here)) * _STRETCHES // len(here)
     return groups
 
 
 def _alone(fitted: FittedModel, number: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the numbers of the logs that tell nearly all there is of every parameter of the effects.
+    """Return the numbers of the logs that hold nearly all information on every parameter of the effects.
 
-    Of every one: a law that only adds a number to another is judged as that other is.
+    Every parameter, so that a law with one number more is scored in the same groups as the simpler law.
     """
     effects = [i for i, (place, _) in enumerate(fitted.parameters) if place is not None]
     told = np.einsum("bii->bi", fitted.matrix)[:, effects]
@@ -84,16 +82,16 @@ def _alone(fitted: FittedModel, number: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def step_without(fitted: FittedModel, inside: NDArray[np.bool_]) -> Array:
-    """Return how a re-fit without the blocks ``inside`` moves the parameters, to first order."""
+    """Return the step of the parameters (n_parameters,) in a re-fit without the blocks ``inside``, to first order."""
     step = _least_squares(fitted, inside, np.full(len(fitted.parameters), np.inf))
     return step / max(1.0, _prior_lengths(fitted, step))
 
 
 def straight_step_without(fitted: FittedModel, inside: NDArray[np.bool_]) -> Array:
-    """Return the same, no further than losses can be predicted to second order.
+    """Return the step of `step_without`, limited to the range where losses are predictable to second order.
 
-    Each number that shapes a law moves by a tenth of itself at most, the others to what is best with that; and
-    no effect by more than it is large. The size of a number is that of the largest of its effect in the same unit.
+    - A parameter that shapes a law moves by at most a tenth of its value; the others follow to their best values.
+    - No parameter moves by more than the largest value of its effect in the same unit.
     """
     reach, size = np.full((2, len(fitted.parameters)), np.inf)
     for place, effect in enumerate(fitted.effects):
@@ -105,23 +103,23 @@ def straight_step_without(fitted: FittedModel, inside: NDArray[np.bool_]) -> Arr
             column = fitted.parameters.index((place, p.name))
             if p.role == "shape":
                 reach[column] = _STRAIGHT * abs(values[p.name])
-            # One that is nothing, as all of its unit are, has no size to go by.
+            # If all values of a unit are zero, there is no size to limit the step.
             size[column] = max(abs(values[q.name]) for q in table if q.unit == p.unit) or np.inf
     step = _least_squares(fitted, inside, reach)
     lengths = float((np.abs(step) / size).max(initial=0.0))
     return step / max(1.0, _prior_lengths(fitted, step), lengths)
 
 
-# Of a number that shapes a law, over which its law is about linear in it: waves over an angle are half a radian
-# out of phase after that, where they come round once.
+# Relative change of a shape parameter over which the law is about linear in it. For a wave over one turn of the angle,
+# 0.1 of its order shifts the phase by 0.6 rad.
 _STRAIGHT = 0.1
 
 
 def _least_squares(fitted: FittedModel, inside: NDArray[np.bool_], reach: Array) -> Array:
-    """Return the step (n_parameters,) to the least without some blocks, each within its reach."""
+    """Return the step (n_parameters,) to the minimum without the blocks ``inside``, within ``reach`` by parameter."""
     matrix = fitted.matrix[~inside].sum(axis=0) + fitted.prior_matrix
     gradient = fitted.gradient[~inside].sum(axis=0) + fitted.prior_gradient
-    # Parameters this part of the data says nothing about stay where they are.
+    # Parameters that this part of the data does not determine keep their values.
     matrix += np.diag(1e-9 * np.einsum("bii->i", fitted.matrix) + 1e-30)
     free = ~_pinned(fitted)
     step = np.zeros(len(gradient))
@@ -137,18 +135,18 @@ def _least_squares(fitted: FittedModel, inside: NDArray[np.bool_], reach: Array)
 
 
 def _prior_lengths(fitted: FittedModel, step: Array) -> float:
-    """Return the largest move in prior standard deviations: beyond one, a linear step is no guide."""
+    """Return the largest move in prior standard deviations. Beyond one, a linear step is not reliable."""
     return float(np.abs(step * np.sqrt(np.diag(fitted.prior_matrix))).max(initial=0.0))
 
 
-# Of its value: a number this near to a bound is at it.
+# Distance from a bound, relative to the value, within which a parameter counts as at the bound.
 _AT = 1e-3
 
 
 def _pinned(fitted: FittedModel) -> NDArray[np.bool_]:
-    """Return which parameters sit on a bound, or next to one, or have no influence (n_parameters,).
+    """Return which parameters (n_parameters,) are at a bound, close to one, or without influence.
 
-    A step from there has one way to go, and where a law is steep it goes far.
+    A step from a bound has only one direction. Where a law is steep, it would go too far.
     """
     influence = np.einsum("bii->i", fitted.matrix)
     bound = np.array([n in fitted.at_bound or _next_to(fitted, n) for n in fitted.parameters])
@@ -156,7 +154,7 @@ def _pinned(fitted: FittedModel) -> NDArray[np.bool_]:
 
 
 def _next_to(fitted: FittedModel, key: tuple[int | None, str]) -> bool:
-    """Whether an effect's number is within a thousandth of itself from a bound."""
+    """Whether an effect's parameter is within 0.1 % of its value from a bound."""
     place, name = key
     if place is None or key not in fitted.room:
         return False
@@ -165,7 +163,7 @@ def _next_to(fitted: FittedModel, key: tuple[int | None, str]) -> bool:
 
 
 def predictable(fitted: FittedModel) -> NDArray[np.bool_]:
-    """Return which blocks (n_blocks,) the model can follow at all; a chaotic one has no derivative."""
+    """Return which blocks (n_blocks,) have derivatives; a block of chaotic motion has none."""
     return np.asarray(np.einsum("bii->b", fitted.matrix) > 0)
 
 
@@ -176,7 +174,7 @@ def predicted_loss(fitted: NormalEquations, blocks: NDArray[np.bool_], step: Arr
 
 
 def linear_gain(fitted: NormalEquations) -> float:
-    """Return how much loss one undamped step from here promises, priors included."""
+    """Return the fall of the loss, priors included, that one undamped linear step predicts."""
     matrix = fitted.matrix.sum(axis=0) + fitted.prior_matrix
     gradient = fitted.gradient.sum(axis=0) + fitted.prior_gradient
     step = linear_step(fitted)
@@ -184,28 +182,28 @@ def linear_gain(fitted: NormalEquations) -> float:
 
 
 def linear_falls(fitted: NormalEquations) -> Array:
-    """Return how much loss of each block (n_blocks,) one undamped step from here takes away."""
+    """Return the fall of the loss of each block (n_blocks,) that one undamped linear step predicts."""
     every = np.ones(len(fitted.loss), dtype=bool)
     return np.asarray(fitted.loss - predicted_loss(fitted, every, linear_step(fitted)))
 
 
 def linear_step(fitted: NormalEquations) -> Array:
-    """Return the step (n_parameters,) to the least of a parabola.
+    """Return the step (n_parameters,) to the minimum of the quadratic model, within the bounds of all parameters.
 
-    Parameters go no further than their bounds, as in a fit: what would take the simulator's own beyond
-    is an effect, and no effect is what it cannot be.
+    Bounds hold as in a fit. A change of an own parameter beyond its bound is an effect, and an effect cannot take
+    values outside its range.
     """
     matrix = fitted.matrix.sum(axis=0) + fitted.prior_matrix
     gradient = fitted.gradient.sum(axis=0) + fitted.prior_gradient
     movable = (np.diag(matrix) > 0) & ~_at_end(fitted)
     free, (least, most) = movable.copy(), _room(fitted)
-    # Bounds of effects are far: none of them says what is large.
+    # The bounds of effects are wide and give no scale, so only own parameters are scaled by theirs.
     own = np.array([n not in fitted.room for n in fitted.parameters], dtype=bool)
     room = np.where(own & np.isfinite(most - least), most - least, 1.0)
     size = np.maximum(np.diag(matrix) * np.maximum(room, 1e-300), 1e-300)
     step = np.zeros(len(gradient))
-    # Active sets (Lawson, Hanson, 1974): what meets its bound is held there, and let go again, the
-    # strongest pull first, where the slope leads back from it.
+    # Active-set method (Lawson, Hanson, 1974): a parameter that meets its bound is fixed there. It is released, the one
+    # with the largest gradient first, if the gradient points back inside.
     for _ in range(3 * len(gradient)):
         step[free] = _newton_step(matrix, gradient + matrix @ np.where(free, 0.0, step), free)
         beyond = free & ((step < least) | (step > most))
@@ -222,12 +220,12 @@ def linear_step(fitted: NormalEquations) -> Array:
     return step
 
 
-# Of the curvature times the room of a parameter: a slope that this small leads nowhere.
+# Smallest slope that counts, relative to the curvature times the distance between the bounds.
 _SLIGHT = 1e-6
 
 
 def _newton_step(matrix: Array, gradient: Array, free: NDArray[np.bool_]) -> Array:
-    """Return the step of the free parameters to the least of a parabola."""
+    """Return the step of the free parameters to the minimum of the quadratic model."""
     a, g = matrix[np.ix_(free, free)], gradient[free]
     scale = 1 / np.sqrt(np.diag(a))
     normal = a * np.outer(scale, scale) + 1e-9 * np.eye(len(a))
@@ -235,24 +233,24 @@ def _newton_step(matrix: Array, gradient: Array, free: NDArray[np.bool_]) -> Arr
 
 
 def _at_end(fitted: NormalEquations) -> NDArray[np.bool_]:
-    """Return which of the simulator's own parameters cannot go further, their tolerances or not.
+    """Return which own parameters cannot go further (n_parameters,), whatever their tolerances allow.
 
-    A tolerance of half the value and more would take it below zero.
+    An example is a tolerance above half of the value, which would allow values below zero.
     """
     stuck = [n[0] is None and n in fitted.at_bound for n in fitted.parameters]
     own = np.array(stuck, dtype=bool)
     least, most = _room(fitted)
-    # Not by its tolerance: that leaves room on both sides.
+    # A parameter at the edge of its tolerance has room on both sides; it is not at its bound.
     inside = np.minimum(-least, most) > _SLIGHT * (most - least)
     return np.asarray(own & inside & np.isfinite(most - least))
 
 
 def _room(fitted: NormalEquations) -> tuple[Array, Array]:
-    """Return the least and the largest step of every parameter (n_parameters,)."""
+    """Return the smallest and the largest step of every parameter (n_parameters,)."""
     precision = np.diag(fitted.prior_matrix)
     own = np.array([n[0] is None for n in fitted.parameters], dtype=bool) & (precision > 0)
     deviation = 1 / np.sqrt(np.where(own, precision, 1.0))
-    # How far it is from its nominal value already.
+    # Distance from the nominal value.
     off = fitted.prior_gradient * deviation**2
     reach = np.where(own, PRIOR_REACH * deviation, np.inf)
     known = np.array([fitted.room.get(n, (-np.inf, np.inf)) for n in fitted.parameters])

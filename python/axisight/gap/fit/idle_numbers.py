@@ -1,10 +1,11 @@
-"""Numbers of an effect that a fit does not need: they are no cost of the effect that has them.
+"""Counts the parameters of an effect that do not pay for themselves, so that the effect is not charged for them.
 
-Orders of a ripple are taken from the residual of the simulator; beside the right one, what is left of it
-at neighbouring orders is taken in too. Of a load or a centre of mass one coordinate may be all that a
-motion shows, of a tilted base one direction; a balancer mostly stands upright where its axis is at zero.
-Of the gains of a cascade one may be another.
-An effect is not to pay for what says nothing for it.
+Examples:
+
+- Ripple orders come from the residual; beside the right order, its neighbours are fitted, too.
+- A motion may show only one coordinate of a payload or a centre of mass, or one direction of a base tilt.
+- A gravity balancer is mostly upright where its axis is at zero.
+- Only one gain of a cascade may be wrong.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from axisight.effects import effect_info
 from axisight.gap.fit.fitted_model import FittedModel
 
 Array = NDArray[np.float64]
-# Names of numbers that are idle or not together, and for how many they count.
+# Names of parameters that can only be idle together, and their number in the cost.
 Term = tuple[tuple[str, ...], float]
 
 # Fitted values of a term of a series: cosine, sine and order.
@@ -26,11 +27,11 @@ _OF_A_WAVE = 3.0
 
 
 def idle_numbers(fitted: FittedModel, pays: Callable[[float, float, float], bool]) -> float:
-    """Return how many numbers of the last effect do not pay for themselves; one of them always does.
+    """Return how many parameters of the last effect do not pay for themselves; at least one always does.
 
-    ``pays``: whether a loss of the second size is that much worse than one of the first, for so many
-    numbers. Without some, all other parameters go where they leave least, to second order. What costs
-    least goes first.
+    ``pays(loss, more, count)``: whether ``count`` parameters are worth the fall from the loss ``more`` to ``loss``.
+    Terms are removed one after another, the cheapest first. For each, all other parameters move to their new minimum,
+    to second order.
     """
     last = len(fitted.effects) - 1
     places = {name: i for i, (place, name) in enumerate(fitted.parameters) if place == last}
@@ -38,7 +39,7 @@ def idle_numbers(fitted: FittedModel, pays: Callable[[float, float, float], bool
     if not terms:
         return 0.0
     effect = fitted.effects[last]
-    # An effect of the arm is seen on every axis.
+    # An effect of the whole arm is judged on all axes.
     here = np.ones(len(fitted.axis), dtype=bool)
     if effect.axis is not None:
         here = fitted.axis == effect.axis - 1
@@ -51,7 +52,7 @@ def idle_numbers(fitted: FittedModel, pays: Callable[[float, float, float], bool
         theta = np.array([values[name] for name in gone]) * size[at]
         return float(theta @ np.linalg.solve(spread[np.ix_(at, at)], theta))
 
-    # Something of it stays: another number, or the term that it needs most.
+    # At least one term stays if all free parameters belong to terms.
     most = len(terms) - (len(places) == sum(len(names) for names, _ in terms))
     gone: list[str] = []
     idle = 0.0
@@ -66,7 +67,7 @@ def idle_numbers(fitted: FittedModel, pays: Callable[[float, float, float], bool
 
 
 def _terms(fitted: FittedModel, free: set[str]) -> list[Term]:
-    """Return what may be idle of the last effect: waves of a series, and what is marked so."""
+    """Return the terms of the last effect that may be idle: waves of a series, and parameters marked as optional."""
     effect = fitted.effects[-1]
     info, values = effect_info(effect.name), effect.parameters or {}
     waves: list[Term] = [
@@ -79,7 +80,7 @@ def _terms(fitted: FittedModel, free: set[str]) -> list[Term]:
 
 
 def _spread(fitted: FittedModel) -> tuple[Array, Array]:
-    """Return the size of every parameter, and their covariance in these sizes."""
+    """Return the scale of every parameter (n_parameters,) and the covariance in these scales."""
     matrix = fitted.matrix.sum(axis=0) + fitted.prior_matrix
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     spread = np.linalg.inv(matrix / np.outer(size, size) + 1e-9 * np.eye(len(matrix)))

@@ -1,4 +1,4 @@
-"""A model under trial: the robot's own parameters, effects, and the fit of both to logs."""
+"""Fits the simulator's own parameters and effects to logs."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 
 
-# Share of the loss that another step of a fit has to be worth.
+# Relative fall of the loss at which a fit ends: for fits of causes, and for fits of candidates.
 _TOLERANCE = 1e-4
 _TRIAL_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
 class _Setup:
-    """What one fit is made of."""
+    """Effects, parameters and reused sensitivities (``warm``) of one fit."""
 
     effects: list[Effect]
     parameters: list[Parameter]
@@ -48,11 +48,10 @@ class _Setup:
 
 
 class ModelFitter(ABC):
-    """Fits models to one set of logs; subclasses say by which error.
+    """Fits models to one set of logs; subclasses define the error that is minimised.
 
-    A model that cannot be simulated is an answer, `Diverged`; misuse raises InputError.
-    ``adds_up``: effects of an axis add up in the error, and hide one another where several are
-    missing: they are tried in pairs too.
+    A model that cannot be simulated is returned as `Diverged`; misuse raises InputError. ``adds_up``: the errors of the
+    effects of an axis add up and can hide one another. Missing effects are then tried in pairs, too.
     """
 
     adds_up = False
@@ -64,7 +63,7 @@ class ModelFitter(ABC):
         self.weighting = weighting
         self.block_s = block_s
         self.cancel = _core.CancelToken()
-        # One count for a fitter and all that are made of it.
+        # A fitter and all its copies share one count.
         self.work = WorkCount()
         self.tolerances = tolerances
         self.natural: NaturalSizes | None = None
@@ -72,13 +71,13 @@ class ModelFitter(ABC):
             robot_parameter(robot, name, relative_tolerance=tolerance)
             for name, value in robot_parameters(robot).items()
             if (tolerance := tolerance_of(tolerances, name)) is not None
-            # What the simulator leaves out has no tolerance: it would be an effect.
+            # A parameter that is zero in the simulator has no tolerance. A value there would be an effect.
             and value != 0
             and self.takes_part(name)
         ]
 
     def within_tolerance(self, effect: Effect) -> bool:
-        """Whether an effect is no more than ordinary scatter of a parameter."""
+        """Whether an effect is no larger than the tolerance of the parameter that it changes (three deviations)."""
         if springs := spring_changes(effect):
             return max(map(abs, springs)) < self.tolerated(effect)
         change = effect.values()[0]
@@ -88,7 +87,7 @@ class ModelFitter(ABC):
         return abs(change) < self.tolerated(effect)
 
     def tolerated(self, effect: Effect) -> float:
-        """Return up to which size an effect is ordinary scatter of a parameter (three deviations)."""
+        """Return the size up to which an effect is within the tolerance of its parameter (three deviations)."""
         name = _same_quantity(self.robot, effect)
         spring = bool(spring_changes(effect))
         if spring and effect.axis is not None:
@@ -101,11 +100,11 @@ class ModelFitter(ABC):
         return 3 * tolerance * nominal
 
     def takes_part(self, name: str) -> bool:
-        """Whether a robot parameter matters to this error."""
+        """Whether a robot parameter enters this error."""
         return bool(name)
 
     def bends(self, name: str) -> bool:
-        """Whether a parameter of the simulator changes what others do too much to keep their sensitivities."""
+        """Whether an own parameter changes the sensitivities of others too much for them to be reused."""
         del name
         return False
 
@@ -118,7 +117,7 @@ class ModelFitter(ABC):
         warm: list[tuple[int, _core.Column]],
         near: _core.Courses | None,
     ) -> _core.FitResult | Diverged:
-        """Run the fit in the core, around the runs ``near`` if there are any."""
+        """Run the fit in the core, starting from the runs ``near`` if there are any."""
 
     @abstractmethod
     def linearize(
@@ -129,28 +128,29 @@ class ModelFitter(ABC):
         warm: list[tuple[int, _core.Column]],
         near: _core.Courses | None,
     ) -> _core.Linearization | Diverged:
-        """Evaluate the model in the core, at the initial values."""
+        """Evaluate the model and its sensitivities in the core, at the initial values."""
 
     def part(self, logs: Sequence[int]) -> ModelFitter:
-        """Return the same for some of the logs, by their numbers; one is cancelled with the other."""
+        """Return a copy for some of the logs, by their numbers; both share one cancellation."""
         other = copy(self)
         other._keep(logs)
         return other
 
     def within(self, tolerances: float) -> ModelFitter:
-        """Return the same with the simulator's own parameters kept within so many of their tolerances."""
+        """Return a copy whose own parameters stay within this many of their tolerances."""
         other = copy(self)
         other.own = [_kept_within(p, tolerances) for p in self.own]
         return other
 
     def beginnings(self) -> ModelFitter | None:
-        """Return the same for the first halves of the logs; None where only the whole will do."""
+        """Return a copy for the first halves of the logs; None if this error needs whole logs."""
         return None
 
     def begun(self, model: FittedModel) -> tuple[ModelFitter, FittedModel] | None:
-        """Return the same for the first halves of the logs, with a model as it is; None to take the whole.
+        """Return a copy for the first halves of the logs, with the model there; None if only whole logs can be used.
 
-        Its sensitivities are those of the whole, cut: weights smear little over the end.
+        The model keeps its values. Its sensitivities are the first halves of those of the whole logs; the weighting
+        filter mixes only a little of the second half into them.
         """
         other = self.beginnings()
         if other is None:
@@ -163,16 +163,16 @@ class ModelFitter(ABC):
         found = other._solved(setup, model.free, other._options(), None, renewed=model.renewed)
         if isinstance(found, Diverged):
             return None
-        # The very same values: fits of what this model screens begin at those of the whole.
+        # Values stay exactly the same: fits of screened candidates start at the values of the whole logs.
         same = replace(found, robot_values=model.robot_values, log=np.unique(model.log)[found.log])
         return other, same
 
     def counted(self) -> Array | None:
-        """Return what every residual counts for (n_residuals,), from 0 to 1; None where all are one."""
+        """Return the weight of every residual (n_residuals,), from 0 to 1; None if all are one."""
         return None
 
     def tempered(self, factor: Array) -> ModelFitter:
-        """Return the same with the errors of every axis times a factor (n_axes,)."""
+        """Return a copy whose errors are multiplied by a factor of each axis (n_axes,)."""
         del factor
         return self
 
@@ -183,9 +183,9 @@ class ModelFitter(ABC):
     def runs(
         self, model: FittedModel, robot_values: Mapping[str, float] | None = None
     ) -> _core.Courses | Diverged | None:
-        """Return runs of a model around which others close to it cost less; None without any.
+        """Return simulated runs of a model, from which similar models are simulated faster; None if there are none.
 
-        ``robot_values``: the simulator's own parameters, where they are not the model's.
+        ``robot_values``: own parameters in place of the model's.
         """
         held = [False] * len(model.free)
         setup = self._setup(model.free, model, robot_values, held, lazy=False)
@@ -197,7 +197,7 @@ class ModelFitter(ABC):
     def run(
         self, effects: Sequence[Effect], parameters: Sequence[Parameter]
     ) -> _core.Courses | Diverged | None:
-        """Run the model in the core, at the initial values."""
+        """Simulate the model in the core, at the initial values."""
         del effects, parameters
         return None
 
@@ -216,21 +216,20 @@ class ModelFitter(ABC):
     ) -> FittedModel | Diverged:
         """Fit the simulator's own parameters and the effects ``free``.
 
-        An effect that the robot has itself is replaced by the free one of its label.
-        The simulator's parameters begin at ``robot_values``, else where
-        ``start`` ended, else at their nominal values; ``lazy`` takes their
-        sensitivities from ``start``; else they are computed where the fit begins, and
-        ``refreshes`` times anew where it has settled: small changes of masses and stiffness
-        hardly bend them. ``fresh`` computes them at every step, for effects that do bend them.
-        ``near`` are `runs` of a model close by. ``worth`` is the loss that another step has to
-        bring, where it is not a share of it.
+        A free effect replaces the effect of the same label that the robot already has. The own parameters begin at
+        ``robot_values``, else where ``start`` ended, else at their nominal values.
+
+        - ``lazy``: own parameters take their sensitivities from ``start``. Else these are computed where the fit begins
+          and ``refreshes`` times where it has settled; small changes of masses and stiffness hardly alter them.
+        - ``fresh``: computes all sensitivities at every step, for effects that do alter them.
+        - ``near``: `runs` of a similar model.
+        - ``worth``: fall of the loss at which the fit ends, in place of a relative one.
         """
-        # What a candidate changes of the sensitivities of effects elsewhere can wait.
+        # A candidate on one axis changes sensitivities of effects on other axes too little to renew them at once.
         here = free[-1].effect.axis if free else None
         held = [lazy and None not in (here, f.effect.axis) and f.effect.axis != here for f in free]
         setup = self._setup(free, start, robot_values, held, lazy=lazy, fresh=fresh)
-        # What is to be compared with others is fitted to less than the formulas agree; so is what
-        # others are to be compared with.
+        # Candidates, and the model that they are compared with, need less precision than formulas of one effect differ.
         tolerance = _TRIAL_TOLERANCE if lazy or not free else _TOLERANCE
         if worth is not None and start is not None:
             tolerance = worth / max(start.total, worth)
@@ -261,7 +260,7 @@ class ModelFitter(ABC):
         robot_values: Mapping[str, float] | None = None,
         near: _core.Courses | None = None,
     ) -> NormalEquations | Diverged:
-        """Return the model where a lazy `fit` would begin."""
+        """Return the normal equations at the point where a lazy `fit` would begin."""
         setup = self._setup(free, start, robot_values, [True] * len(free), lazy=True)
         return self._evaluated(setup, near)
 
@@ -273,7 +272,7 @@ class ModelFitter(ABC):
         robot_values: Mapping[str, float] | None = None,
         near: _core.Courses | None = None,
     ) -> float | Diverged:
-        """Return the loss where a `fit` would begin."""
+        """Return the loss at the point where a `fit` would begin."""
         setup = self._setup(free, start, robot_values, [True] * len(free), lazy=True)
         fixed = [replace(p, frozen=True) for p in setup.parameters]
         found = self._evaluated(replace(setup, parameters=fixed, warm=[]), near)
@@ -282,10 +281,10 @@ class ModelFitter(ABC):
     def evaluate_each(
         self, options: Sequence[Hypothesis], start: FittedModel, near: _core.Courses | None = None
     ) -> list[NormalEquations] | Diverged:
-        """Return what `evaluate` would for each of several effects that do nothing as they are.
+        """Return the result of `evaluate` for each of several effects without influence at their start values.
 
-        They do not disturb one another: one evaluation serves all. One that stands in for a
-        parameter of the simulator finds it where ``start`` has it, not at its nominal value.
+        Such effects do not change one another, so one evaluation serves all. An effect that replaces an own parameter
+        starts where ``start`` has that parameter, not at its nominal value.
         """
         free, n = [*start.free, *options], len(start.free)
         setup = self._setup(free, start, None, [True] * len(free), lazy=True, fixed_by=start.free)
@@ -306,7 +305,7 @@ class ModelFitter(ABC):
         return replace(_linearized(result, setup), jacobian=tuple(result.columns))
 
     def replaced(self, free: Sequence[Hypothesis]) -> set[str]:
-        """Return the robot's parameters that effects stand in for."""
+        """Return the robot's parameters that the effects replace."""
         names = (_same_quantity(self.robot, f.effect) for f in free)
         return {name for name in names if name is not None}
 
@@ -331,15 +330,15 @@ class ModelFitter(ABC):
         fresh: bool = False,
         fixed_by: Sequence[Hypothesis] | None = None,
     ) -> _Setup:
-        """Return parameters and warm columns.
+        """Return the effects, parameters and reused sensitivities of a fit.
 
-        ``held``: effects whose columns ``start`` may have; ``fixed_by``: effects, all unless
-        given, that hold the robot's parameters they stand in for at their values.
+        ``held``: for each effect, whether it may reuse columns of ``start``; ``fixed_by``: the effects that fix the own
+        parameters that they replace, by default all.
         """
         begin: Mapping[str, float] = {} if start is None else start.robot_values
         if robot_values is not None:
             begin = robot_values
-        # One that the simulator has itself is tried with other values: it takes its place.
+        # An effect that the simulator already has is replaced by the hypothesis of the same label.
         tried = [f.effect for f in free]
         same = self.replaced(free if fixed_by is None else fixed_by)
         own = [
@@ -398,7 +397,7 @@ def _kept_within(parameter: Parameter, tolerances: float) -> Parameter:
 
 
 def _first_halves(model: FittedModel) -> list[tuple[int, int]]:
-    """Return the rows (first, behind the last) of the residual that belong to first halves of logs."""
+    """Return the rows (first, behind the last) of the residuals in the first half of each log and axis."""
     rows = []
     for log in np.unique(model.log):
         for axis in np.unique(model.axis):
@@ -414,7 +413,7 @@ def _is_relative(effect: str) -> bool:
 
 
 def _same_quantity(robot: Robot, effect: Effect) -> str | None:
-    """Return the robot parameter that an effect stands in for: it is then held at its value."""
+    """Return the own parameter that an effect replaces, which is then fixed; None if there is none."""
     stands_for = effect_info(effect.name).stands_for
     if effect.axis is None or stands_for is None:
         return None
@@ -494,17 +493,17 @@ def _fitted_model(
 
 
 def _deviations(result: _core.FitResult, at: NormalEquations) -> Array:
-    """Return the standard deviations (n_parameters,), infinite where the data do not show a parameter."""
+    """Return the standard deviations (n_parameters,), infinite for parameters that the data do not determine."""
     variance = np.diag(result.sandwich)
     if np.isfinite(variance).all():
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
-    # One that they do not show leaves the normal equations without an inverse.
+    # Such a parameter makes the normal equations singular.
     scatter = at.gradient.T @ at.gradient + at.prior_matrix
     return deviations_seen(at.matrix.sum(axis=0) + at.prior_matrix, scatter)
 
 
 def _samples(start: NDArray[np.int64], size: NDArray[np.int64], counted: Array | None) -> Array:
-    """Return what the residuals of every block count for in all (n_blocks,)."""
+    """Return the total weight of the residuals of every block (n_blocks,)."""
     if counted is None:
         return size.astype(np.float64)
     total = np.concatenate([[0.0], np.cumsum(counted)])

@@ -1,4 +1,4 @@
-"""Normal equations of which the data do not show every direction."""
+"""Inverse and standard deviations from normal equations that do not have full rank."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Of directions, relative to the largest, that the data do not show; and share of such a direction from which
-# a parameter is one that they do not.
+# Eigenvalue, relative to the largest, below which the data do not determine a direction; and the share of such
+# directions in a parameter above which the parameter is undetermined.
 _RANK = 1e-10
 _UNSEEN = 1e-3
 
 
 def pseudo_inverse(matrix: Array) -> Array:
-    """Return the inverse of a positive semidefinite matrix, zero where it has no rank; units do not matter."""
+    """Return the pseudo-inverse of a positive semidefinite matrix (n, n), independent of the parameters' units."""
     scale = _scale(matrix)
     scaled = matrix * np.outer(scale, scale)
     inverse = np.linalg.pinv(scaled, rcond=_RANK, hermitian=True)
@@ -22,9 +22,9 @@ def pseudo_inverse(matrix: Array) -> Array:
 
 
 def deviations_seen(matrix: Array, scatter: Array) -> Array:
-    """Return the deviations of a sandwich (n,), those of parameters that the data do not show infinite.
+    """Return the standard deviations (n,) of a sandwich estimate, infinite for undetermined parameters.
 
-    ``matrix`` (n, n): normal equations; ``scatter``: of the gradient.
+    ``matrix`` (n, n): normal equations; ``scatter`` (n, n): scatter of the gradient.
     """
     inverse, scale = pseudo_inverse(matrix), _scale(matrix)
     variance = np.diag(inverse @ scatter @ inverse)

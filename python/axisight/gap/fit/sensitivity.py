@@ -1,4 +1,4 @@
-"""How much an amplitude of an effect would raise the loss, from the normal equations of one evaluation."""
+"""Sensitivity of the loss to an effect that the model lacks, from the normal equations of one evaluation."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What the first amplitude of a candidate that is its own does.
+    """Sensitivity of the loss to one amplitude of a candidate, the first that no simpler law has.
 
-    Those that it shares with a plainer law make up for what they can; everything else of the candidate
-    does nothing. ``rest``: normal equations of all other parameters, one block an axis, for an amplitude
-    of one that the model lacks; ``more``: how many times as much data there are.
+    Amplitudes shared with a simpler law may compensate for it; all other parameters of the candidate stay neutral.
+    ``rest``: normal equations of all other parameters, one block per axis, for a missing amplitude of one. ``more``:
+    factor on the amount of data.
     """
 
     option: Hypothesis
@@ -29,17 +29,17 @@ class Sensitivity:
     more: float = 1.0
 
     def scaled(self, factor: float) -> Sensitivity:
-        """Return that of ``factor`` times as much data."""
+        """Return the sensitivity for ``factor`` times as much data."""
         return replace(self, more=factor * self.more)
 
     def unfitted(self, amplitude: float) -> Array:
-        """Return what an amplitude that the model lacks leaves (n_axes,) while nothing makes up for it."""
+        """Return the loss on each axis (n_axes,) of a missing amplitude, without any compensation."""
         return np.asarray(self.more * amplitude**2 * self.rest.loss)
 
     def losses(self, amplitude: float) -> Array:
-        """Return what an amplitude that the model lacks leaves on each axis (n_axes,).
+        """Return the loss on each axis (n_axes,) that a missing amplitude leaves after the other parameters compensate.
 
-        The simulator's own parameters make up for what they can within their bounds.
+        The simulator's own parameters compensate within their bounds.
         """
         lacking = replace(
             self.rest, gradient=amplitude * self.rest.gradient, loss=amplitude**2 * self.rest.loss
@@ -52,9 +52,9 @@ class Sensitivity:
 def sensitivity(
     option: Hypothesis, fitted: NormalEquations, axis: NDArray[np.int64]
 ) -> Sensitivity | None:
-    """Return the sensitivity of a candidate that does nothing as it is; None of any other.
+    """Return the sensitivity of a candidate without influence at its start values; None for any other.
 
-    ``fitted``: the model with the candidate, last; ``axis`` (n_blocks,) of the blocks.
+    ``fitted``: the model with the candidate as its last effect; ``axis`` (n_blocks,): axis of each block.
     """
     info = effect_info(option.effect.name)
     sizes = {p.name for p in info.parameters if p.role == "amplitude"}
@@ -70,7 +70,7 @@ def sensitivity(
     names = tuple(fitted.parameters[i] for i in rest)
     axes = range(int(axis.max()) + 1)
     by_axis = np.stack([fitted.matrix[axis == i].sum(axis=0) for i in axes])
-    # From where the fit stands: what it left of its own is no matter of the effect.
+    # The prior gradient of the present fit is not caused by the missing effect.
     return Sensitivity(
         option,
         name,

@@ -1,4 +1,4 @@
-"""Fits that go on until steps bring no more."""
+"""Fits that continue until further steps bring no improvement."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from axisight.gap.fit.held_out import linear_gain
 from axisight.gap.fit.model_fitter import ModelFitter
 
 SETTLED = 1e-3
-"""Share of a loss that another step of a fit may promise where it has settled."""
+"""A fit has settled if one more step promises less than this share of the loss."""
 RENEWALS = 1
-"""How often sensitivities are renewed in a fit that is to last."""
+"""Number of times that sensitivities are renewed in the fit of a cause."""
 
 
 def settled(
@@ -24,10 +24,10 @@ def settled(
     max_iterations: int = 6,
     worth: float | None = None,
 ) -> FittedModel | Diverged:
-    """Return a fit with sensitivities of its own, as often renewed as it needs.
+    """Return a fit with sensitivities of its own, renewed as often as it needs.
 
-    ``rough``: the same for part of the data, which brings what bends the simulator most of the way;
-    ``worth``: loss that another step has to bring, where it is not a share of it.
+    ``rough``: fitter for part of the data, which makes most of the way at lower cost; ``worth``: fall of the loss at
+    which the fit ends, in place of a relative one.
     """
     if start.renewed and len(free) == len(start.free):
         return _renewed(fitter, start, max_iterations)
@@ -43,12 +43,12 @@ def settled(
 def _renewed(
     fitter: ModelFitter, found: FittedModel | Diverged, max_iterations: int
 ) -> FittedModel | Diverged:
-    """Return a fit, with sensitivities renewed at every step where it has not settled without."""
+    """Return a fit; if it has not settled, continued with new sensitivities at every step."""
     if isinstance(found, Diverged) or has_settled(found):
         return found
     return fitter.fit(found.free, found, fresh=True, max_iterations=max_iterations)
 
 
 def has_settled(found: FittedModel) -> bool:
-    """Whether steps of a fit bring no more."""
+    """Whether further steps of a fit bring no improvement."""
     return found.converged or found.stuck or linear_gain(found) < SETTLED * found.total

@@ -1,4 +1,4 @@
-"""The simulator's own parameters at the edge of their tolerance."""
+"""Finds own parameters that the re-fit moved to the edge of their tolerance."""
 
 from __future__ import annotations
 
@@ -10,24 +10,23 @@ from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.simulator.own_parameters import nominal_values
 from axisight.gap.simulator.tolerances import tolerance_of
 
-# A parameter this many of its tolerances off is one machine in four hundred: rather something
-# unmodelled that pulls at it.
+# Change, in tolerances, from which a parameter is at the edge. By chance this happens to one machine in 400; more
+# likely an unmodelled effect pulls at it.
 _EDGE = 3.0
 BENT = 0.25
-"""Share of the simulator's own parameters at the edge (one machine in four hundred each): of so many, it
-is bent to something unmodelled."""
+"""Share of the own parameters at the edge from which something unmodelled bends the simulator."""
 
 
 def parameters_at_edge(
     fitted: FittedModel, nominal: Mapping[str, float], tolerances: Mapping[str, float]
 ) -> tuple[Finding, ...]:
-    """Return a finding for each re-fitted parameter three tolerances off, or at its bound.
+    """Return a finding for each re-fitted parameter that is three tolerances off, or at its bound.
 
     ``nominal``: values of the robot by name; ``tolerances``: relative standard deviations by quantity or name.
     """
     out = []
     for name, value in fitted.robot_values.items():
-        if name not in nominal:  # a constant that nobody knows has a finding of its own
+        if name not in nominal:  # parameters without a nominal value have a finding of their own
             continue
         tolerance = tolerance_of(tolerances, name) or 0.0
         change = (value - nominal[name]) / (abs(nominal[name]) or 1.0)
@@ -44,9 +43,10 @@ def parameters_at_edge(
 
 
 def bent(fitter: ModelFitter, model: FittedModel) -> float:
-    """Return the share of the simulator's own parameters that a model takes to the edge [1].
+    """Return the share of the simulator's own parameters that a model moves to the edge of their tolerance [1].
 
-    Nothing where errors add up: there masses that a few seconds hardly tell go to the edge by themselves.
+    Zero if errors add up (inverse dynamics): there, masses that a short log hardly determines reach the edge without
+    cause.
     """
     if fitter.adds_up:
         return 0.0

@@ -1,4 +1,4 @@
-"""The work that fits of one diagnosis did, counted on any thread."""
+"""Counts the work of all fits of one diagnosis, on any thread."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from axisight.gap.facts.trace import Work
 
 
 class WorkCount:
-    """Counts work; ``done`` is what was done so far."""
+    """Thread-safe count of work; ``done`` holds the sum so far."""
 
     def __init__(self) -> None:
         self.done = Work()
@@ -27,6 +27,6 @@ class WorkCount:
             )
 
     def linearization(self) -> None:
-        """Count a model that was evaluated with its sensitivities, and not fitted."""
+        """Count a model that was evaluated with its sensitivities but not fitted."""
         with self._lock:
             self.done = replace(self.done, linearizations=self.done.linearizations + 1)
