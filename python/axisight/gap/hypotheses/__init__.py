@@ -1,1 +1,1 @@
-"""Effects that may be missing: the candidates, and where the fit of each begins."""
+"""Hypotheses of a diagnosis: effects that the simulator may lack, and where the fit of each begins."""

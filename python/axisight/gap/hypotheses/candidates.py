@@ -1,4 +1,4 @@
-"""The candidates of a diagnosis: every effect on every axis, with start values from the data."""
+"""Lists the hypotheses of a diagnosis: every effect on every axis, with start values from the data."""
 
 from __future__ import annotations
 
@@ -30,9 +30,10 @@ def situation(
     enough: Array,
     before: Sequence[Sequence[Turning]] = (),
 ) -> StartData:
-    """Return the residual of a model and how the motors turned, by log and axis.
+    """Return the weighted residual of a model and the motion of the motors, by log and axis.
 
-    ``before``: the same of another model, if there was one: motors turned as they did.
+    ``response``: see `StartData`; ``enough`` (n_axes,): mean square of the residual up to which no cause is worth
+    naming. ``before``: the result for another model of the same logs, whose motion is reused.
     """
 
     def one(i: int, log: Log, axis: int) -> Turning:
@@ -43,7 +44,7 @@ def situation(
             return before[i][axis].leaving(residual)
         position = log.position_rad[:, axis]
         speed = np.gradient(position, log.sample_time_s)
-        # A short running mean takes the quantization and noise off the speed.
+        # A running mean over nine samples removes quantization and noise from the speed.
         speed = np.convolve(speed, np.ones(9) / 9, mode="same")
         return turning(residual, position, speed, log.sample_time_s, decimation)
 
@@ -61,9 +62,10 @@ def all_candidates(
     by_targets: bool = False,
     threads: int = 1,
 ) -> list[Hypothesis]:
-    """Return one candidate per effect and place that can act on this robot and has a gap.
+    """Return one candidate for each effect and each axis or pair of axes where it can act and a gap is left.
 
-    What an effect does elsewhere, it does on its own axis too: one without a gap needs none.
+    An effect always shows on its own axis, so an axis without a gap needs no candidates. ``inverse_dynamics``: only
+    effects that show in computed torque; ``by_targets``: start values for compared positions.
     """
     trials = [
         StartContext(info, place, robot, logs, at)
@@ -81,15 +83,16 @@ def all_candidates(
     return [_from(own[c.effect.label], c) if c.effect.label in own else c for c in out]
 
 
-# Of a rotor's inertia: what a motor feels of its arm, from where it tells on which side friction acts.
+# Smallest inertia of the arm at a motor, as a share of the rotor's, from which logs tell on which side of the gear
+# friction acts.
 _HEAVY = 0.2
 
 
 def one_sided(robot: Robot) -> list[int]:
-    """Return the axes (from 1) whose logs do not tell friction of the motor from friction behind its gear.
+    """Return the axes (from 1) whose logs do not tell motor friction from friction behind the gear.
 
-    Gears that are rigid, and arms that are light: they follow their motors, and sharp friction on little
-    inertia is hard to integrate for nothing.
+    These axes have a rigid gear or a light arm, which follows the motor. Friction behind the gear is not tried there:
+    sharp friction on a small inertia is slow to integrate.
     """
     rotor = rotors(robot)
     felt = np.diag(inertia_of_motors(robot)) - rotor
@@ -100,7 +103,7 @@ def one_sided(robot: Robot) -> list[int]:
 
 
 def on_the_motor(candidate: Hypothesis) -> Hypothesis:
-    """Return a candidate without what tells friction of the motor from friction behind an elastic gear."""
+    """Return a candidate with all its friction on the motor side, and no parameter to move it behind the gear."""
     given = dict(candidate.effect.parameters or {})
     if BEHIND_GEAR not in given:
         return candidate
@@ -111,16 +114,16 @@ def on_the_motor(candidate: Hypothesis) -> Hypothesis:
 
 
 def _in_torque(info: EffectInfo) -> bool:
-    """Whether an effect is looked for in predicted torque.
+    """Whether an effect is tried in inverse dynamics.
 
-    Not between axes: of these the turn of an elastic gear is looked for, and gears are rigid there; nor what
-    is another effect there.
+    Left out are effects between axes, which act through an elastic gear, and bristle friction: gears are rigid there,
+    and it equals another effect.
     """
     return info.inverse_dynamics and info.scope != "axes" and info.name != BRISTLES[0]
 
 
 def _places(robot: Robot, info: EffectInfo) -> list[Place]:
-    """Return the axes on which an effect can act, or neighbours among them; None for the arm."""
+    """Return the axes (from 1) or pairs of neighbouring axes on which an effect can act; (None,) for the whole arm."""
     if info.scope == "arm":
         return [None]
     if info.scope == "axes":
@@ -135,7 +138,7 @@ def _places(robot: Robot, info: EffectInfo) -> list[Place]:
 
 
 def _has_what_changes(robot: Robot, info: EffectInfo, axis: int) -> bool:
-    """Whether an axis has the link that an effect acts on, and what it changes by a share or adds."""
+    """Whether an axis has the link that an effect acts on, and the parameter that it scales or adds."""
     if info.acts == "arm" and robot.axis_parameter(axis, "mass") is None:
         return False
     if info.stands_for is None:
@@ -143,13 +146,13 @@ def _has_what_changes(robot: Robot, info: EffectInfo, axis: int) -> bool:
     quantity, change = info.stands_for
     name = robot.axis_parameter(axis, quantity)
     there = name is not None and robot.parameters()[name] != 0
-    # What is there is changed by a share of itself, where an effect does that.
+    # If an effect scales the parameter, a second one that adds to it would be the same.
     shares = any(other.stands_for == (quantity, "relative") for other in effect_table().values())
     return there if change == "relative" else not (there and shares)
 
 
 def _from(own: Effect, candidate: Hypothesis) -> Hypothesis:
-    """Return the candidate that begins where the simulator has the same effect already."""
+    """Return the candidate with start values from the same effect that the simulator already has."""
     info = effect_info(own.name)
     values = dict(zip((p.name for p in info.parameters), own.values(), strict=True))
     stated = dict(values)
@@ -159,7 +162,7 @@ def _from(own: Effect, candidate: Hypothesis) -> Hypothesis:
     }
     free = candidate.free
     given = candidate.effect.parameters or {}
-    # Of numbered terms those that the search may use.
+    # Numbered terms of a series, of which the candidate uses some.
     terms = [t for t in info.terms().values() if t[0] in given and len(info.terms()) > 1]
     if terms:
         free = _merged_terms(values, given, terms)
@@ -171,8 +174,8 @@ def _from(own: Effect, candidate: Hypothesis) -> Hypothesis:
 def _merged_terms(
     values: dict[str, float], given: Mapping[str, float], terms: Sequence[tuple[str, str, str]]
 ) -> tuple[str, ...]:
-    """Put orders of the data into the terms that the simulator leaves empty; return what is free."""
-    # A place without amplitude is empty, whatever its order.
+    """Put orders from the data into the terms that the simulator leaves empty; return the free parameters."""
+    # A term without amplitude is empty, whatever its order.
     mine = {order: values[order] for order, *waves in terms if any(values[w] for w in waves)}
     found = (given[order] for order, *_ in terms)
     new = iter(order for order in found if order and order not in mine.values())

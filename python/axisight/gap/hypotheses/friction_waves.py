@@ -1,4 +1,4 @@
-"""Over which wave of the motor angle dry friction is larger in some places than in others."""
+"""Estimates how dry friction varies with the motor angle."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from axisight.gap.hypotheses.ripple_orders import Complex, Turning, passed
 
 Array = NDArray[np.float64]
 
-# Of the speeds seen, above which dry friction is all there.
+# Share of the top speed above which dry friction has its full size.
 _SLIPPING = 0.003
-# From wave to wave tried: over the longest travel none is a radian out of phase.
+# Ratio of neighbouring orders. Over the longest travel, their phases differ by less than a radian.
 _FINER = 1.1
-# How steeply what is faster is left out.
+# Exponent of the filter that leaves out frequencies above ``below_hz``.
 _FALLS = 4
-# Share of the residual's square that a wave takes beside friction which is the same everywhere.
+# Share of the squared residual that a wave must explain in addition to uniform friction.
 _WORTH = 0.01
 
 
@@ -29,15 +29,17 @@ def wave_of_friction(
     *,
     below_hz: float,
 ) -> tuple[float, float, float] | None:
-    """Return the order between two [1/motor turn] with which dry friction changes most, if it does.
+    """Return the order [1/motor turn] at which dry friction varies most, with its cosine and sine amplitude [Nm].
 
-    With the cosine and the sine of that friction [Nm]. Least squares of the residuals (n,) of all logs on the
-    sign of speed, and on it times cosine and sine of ``order phi``, through the response
-    (`axisight.gap.hypotheses.ripple_orders.strongest_orders`) of each log, all of them below ``below_hz``:
-    there friction is the same before and behind an elastic gear. None where no order takes a
-    hundredth beside the sign alone.
+    None if no order explains 1 % of the squared residual in addition to uniform friction. ``lowest`` and ``highest``
+    bound the order.
 
-    Cost: two transforms an order and log.
+    Method: least squares of the residuals (n,) of all logs on the sign of the speed, and on that sign times the cosine
+    and the sine of ``order phi``. Each passes the response of its log (see
+    `axisight.gap.hypotheses.ripple_orders.strongest_orders`) and a filter at ``below_hz``: below it, friction before
+    and behind an elastic gear shows alike.
+
+    Cost: two Fourier transforms for each order and log.
     """
     count = 1 + int(np.ceil(np.log(highest / lowest) / np.log(_FINER)))
     orders = np.geomspace(lowest, highest, count)
@@ -62,5 +64,5 @@ def wave_of_friction(
         solved = np.linalg.lstsq(normal[np.ix_(pick, pick)], along[pick], rcond=1e-8)[0]
         found.append((float(solved @ along[pick]) - even, float(order), solved[1:]))
     taken, order, wave = max(found, key=lambda one: one[0])
-    # The response is that to a torque on the motor, which friction holds back.
+    # The response is that to a motor torque; friction has the opposite sign.
     return (order, *(-wave).tolist()) if taken > _WORTH * power else None

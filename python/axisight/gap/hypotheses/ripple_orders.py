@@ -1,4 +1,4 @@
-"""Which orders of the motor angle stand out in a residual."""
+"""Finds the orders of the motor angle that stand out in a residual."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# Waves per turn of the motor [1]: slots and poles of servo motors give no higher ones of any size.
+# Largest number of waves per motor turn [1]: slots and poles of servo motors cause no stronger ones above it.
 HIGHEST_ORDER = 80
-# Waves are left out where they come near the Nyquist frequency of the residual.
+# Share of the Nyquist frequency above which a wave is left out.
 _OF_NYQUIST = 0.8
-# Share of a log that fades in and out.
+# Share of a log that is faded in and out.
 _TAPERED = 0.05
-# An order is worth a term when it takes so much of what the others leave.
+# Share of the remaining squared residual that an order must explain.
 _WORTH = 0.05
-# Cosine and sine of an order that hardly turns look alike.
+# Smallest relative determinant. For an order that hardly turns, cosine and sine are nearly the same.
 _LEAST_APART = 1e-8
-# What a motion keeps whatever the residual is.
+# Cached values that depend on the motion but not on the residual.
 _KNOWN_OF_WAVES = ("spectra", "_normals")
 
 
 @dataclass(frozen=True)
 class Turning:
-    """One axis in one log: residual (n,) and how its motor turned.
+    """Residual and motor motion of one axis in one log.
 
-    ``angle_rad`` and ``speed_rad_s`` (n,) every ``sample_time_s``, like the residual, whose first sample
-    lies ``later_s`` after theirs.
+    ``residual``, ``angle_rad``, ``speed_rad_s``: (n,) each, every ``sample_time_s``. The first sample of the residual
+    lies ``later_s`` after that of the motion.
     """
 
     residual: Array
@@ -42,7 +42,7 @@ class Turning:
     later_s: float = 0.0
 
     def leaving(self, residual: Array) -> Turning:
-        """Return the same motion with another residual (n,); what is known of its waves is kept."""
+        """Return the same motion with another residual (n,); cached values of the motion stay."""
         other = replace(self, residual=residual)
         vars(other).update({k: v for k, v in vars(self).items() if k in _KNOWN_OF_WAVES})
         return other
@@ -54,40 +54,40 @@ class Turning:
 
     @cached_property
     def spectra(self) -> Complex:
-        """Spectra of the cosines of every order, then of the sines (2 orders, n // 2 + 1)."""
+        """Spectra of the cosines of all orders, then of the sines (2 orders, n // 2 + 1)."""
         order = np.arange(1, HIGHEST_ORDER + 1)[:, None]
         used = np.abs(self.speed_rad_s) * order < np.pi * _OF_NYQUIST / self.sample_time_s
         wave = np.cumprod(np.broadcast_to(np.exp(1j * self.angle_rad), used.shape), axis=0) * used
-        # From nothing to nothing: the jump from the end of a log to its start is no wave.
+        # Fade in and out, so that the jump from the end of a log to its start adds no wave.
         wave *= scipy.signal.windows.tukey(len(self.angle_rad), _TAPERED)
         spectra = np.fft.rfft(np.concatenate([wave.real, wave.imag]))
         return np.asarray(spectra * np.exp(2j * np.pi * self.frequency_hz * self.later_s))
 
     @cached_property
     def _normals(self) -> dict[bytes, Array]:
-        """Normal matrices by response."""
+        """Cache of normal matrices, by response."""
         return {}
 
     def normal(self, response: Complex) -> Array:
-        """Return the products of the waves of all orders through a response, without means (160, 160)."""
+        """Return the inner products of the waves of all orders after a response, without means (160, 160)."""
         key = response.tobytes()
         if key not in self._normals:
-            # By Parseval's theorem, from the spectra: rows of real numbers, as long as a log.
+            # By Parseval's theorem from the spectra, split into real and imaginary parts.
             passed = self.spectra * (response * np.sqrt(self._parseval))
             rows = np.concatenate([passed.real, passed.imag], axis=1)
             self._normals[key] = rows @ rows.T
         return self._normals[key]
 
     def along(self, response: Complex, residual: Array) -> Array:
-        """Return the products of the waves through a response with a residual (160,)."""
+        """Return the inner products of the waves after a response with a residual (160,)."""
         seen = np.conj(np.fft.rfft(residual)) * response * self._parseval
         return np.asarray((self.spectra @ seen).real)
 
     @property
     def _parseval(self) -> Array:
-        """Weights by which a product of spectra sums to that of the series; none of the means.
+        """Weights (n // 2 + 1,) that make a product of spectra equal to the inner product of the series.
 
-        Nor of the Nyquist frequency, where a wave has no phase.
+        Zero for the mean, and for the Nyquist frequency, where a wave has no phase.
         """
         n = len(self.residual)
         weights = np.full(n // 2 + 1, 2.0 / n)
@@ -100,14 +100,14 @@ class Turning:
 def turning(
     residual: Array, position_rad: Array, speed_rad_s: Array, sample_time_s: float, decimation: int
 ) -> Turning:
-    """Return a residual decimated as `Weighting` does, with position and speed of the full log."""
+    """Return a residual that was decimated as in `Weighting`, with angle and speed of the full log at its samples."""
     count = len(residual)
     return Turning(
         residual,
         position_rad[::decimation][:count],
         speed_rad_s[::decimation][:count],
         sample_time_s * decimation,
-        # Mirrored at its ends, a decimated sample stands in the middle of those it replaces.
+        # A decimated sample lies in the middle of the samples that it replaces.
         0.5 * (decimation - 1) * sample_time_s,
     )
 
@@ -115,17 +115,18 @@ def turning(
 def strongest_orders(
     logs: Sequence[Turning], responses: Sequence[Complex], *, count: int, least_turns: float = 0.0
 ) -> list[int]:
-    """Return up to ``count`` integer orders of the motor angle, in the order they were found.
+    """Return up to ``count`` integer orders of the motor angle, the first found first.
 
-    ``responses``: for each log, from an error that repeats with the motor angle to the residual, at its
-    `Turning.frequency_hz`. Least squares of the residuals of all logs on cosine and sine of
-    ``n phi``, passed through the response; one order after another, each with those before it
-    (orthogonal matching pursuit; Pati, Rezaiifar, Krishnaprasad, 1993), until one takes less than
-    a twentieth of what is left. An order is one amplitude and phase for all logs. Orders that come
-    round less often than ``least_turns`` over the travel are left out.
+    ``responses``: for each log, the transfer from an error that repeats with the motor angle to the residual, at the
+    frequencies `Turning.frequency_hz`. ``least_turns``: orders with fewer waves over the travel are left out.
 
-    Cost: a transform an order and log, and products of 160 numbers a sample, both once for all residuals
-    of a motion and response.
+    Method: least squares of the residuals of all logs on cosine and sine of ``n phi`` after the response, with one
+    amplitude and phase for all logs. One order after another is added, each fitted with those before it (orthogonal
+    matching pursuit; Pati, Rezaiifar, Krishnaprasad, 1993). The search ends if an order explains less than 5 % of the
+    remaining squared residual.
+
+    Cost: one Fourier transform for each order and log, and products of 160 values per sample. Both are cached by motion
+    and response.
     """
     size = 2 * HIGHEST_ORDER
     normal, along, power = np.zeros((size, size)), np.zeros(size), 0.0
@@ -148,14 +149,14 @@ def strongest_orders(
 
 
 def passed(series: Array, response: Complex) -> Array:
-    """Return series (k, n) of the sample time of a residual through a response, without means."""
+    """Return series (k, n), sampled like a residual, after a response and without means."""
     out = np.fft.rfft(series) * response
     out[:, 0] = 0.0
     return np.asarray(np.fft.irfft(out, series.shape[1]))
 
 
 def _gains(normal: Array, along: Array, found: Sequence[int]) -> Array:
-    """Return by how much each order, with those found, lowers the sum of squares (orders,)."""
+    """Return the fall of the sum of squares (orders,) that each order brings in addition to those found."""
     taken = [n - 1 for n in found]
     taken += [i + HIGHEST_ORDER for i in taken]
     if taken:

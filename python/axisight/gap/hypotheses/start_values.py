@@ -1,7 +1,6 @@
 """Start values, bounds and priors of effects from data: one table entry per effect.
 
-An entry takes a :class:`StartContext` and returns the effect with what is free in it, or None where the
-data have nothing to start from.
+An entry takes a :class:`StartContext` and returns a hypothesis, or None if the effect cannot be found in these data.
 """
 
 from __future__ import annotations
@@ -25,19 +24,22 @@ Array = NDArray[np.float64]
 
 
 def _neutral(trial: StartContext) -> Hypothesis:
-    """Begin at the neutral values, everything free."""
+    """Start at the neutral values with all parameters free."""
     parameters = trial.info.parameters
     values = {p.name: p.neutral for p in parameters}
     return Hypothesis(trial.effect(values), tuple(values))
 
 
-def _before_the_last(trial: StartContext) -> Hypothesis | None:
-    """Begin at the neutral values; the last link carries no axis."""
+def _not_last_link(trial: StartContext) -> Hypothesis | None:
+    """Start at the neutral values; None for the last link, which carries no further axis."""
     return _neutral(trial) if trial.index + 1 < trial.robot.n_axes else None
 
 
 def _law(**shares: float) -> Callable[[StartContext], Hypothesis]:
-    """Begin at neutral values, and behind the gear; speeds that shape a friction law are shares of the speeds seen."""
+    """Return a start at neutral values, with shape speeds of a friction law as ``shares`` of the axis's top speed.
+
+    A further start puts the friction behind the gear, if the law has that parameter.
+    """
 
     def start(trial: StartContext) -> Hypothesis:
         top = max(float(np.abs(x[trial.index].speed_rad_s).max()) for x in trial.at.turning) or 1.0
@@ -50,15 +52,15 @@ def _law(**shares: float) -> Callable[[StartContext], Hypothesis]:
     return start
 
 
-# Of the top speed of an axis: the corner of dry friction, and the speed over which friction falls.
+# Shares of an axis's top speed: the smoothing of dry friction around zero speed, and the Stribeck speed.
 _SMOOTHING, _STRIBECK = 0.003, 0.1
-# Friction falls with speed over a thousandth to a tenth of the top speed, by grease and load; over more of that of
-# slow motions.
+# Shares of the top speed for further starts of the Stribeck speed: by grease and load it lies between 0.001 and 0.1 of
+# the top speed, and higher in slow motions.
 _STRIBECK_STARTS = (0.003, 0.01, 0.03, 0.3)
 
 
 def _stribeck(trial: StartContext) -> Hypothesis:
-    """Begin as a law with several speeds over which friction falls: a fit does not cross decades."""
+    """Start as a friction law with several Stribeck speeds; a fit does not move over decades of speed."""
     name = "stribeck_speed_rad_s"
     begin = _law(smoothing_rad_s=_SMOOTHING, **{name: _STRIBECK})(trial)
     speed = float((begin.effect.parameters or {})[name])
@@ -71,12 +73,15 @@ def _stribeck(trial: StartContext) -> Hypothesis:
     return replace(begin, bounds=bounds, starts=starts)
 
 
-# Ways over which bristles yield, of the travel of the motor: less is dry friction, more a spring.
+# Pre-sliding distances as shares of the motor's travel: shorter ones look like dry friction, longer ones like a spring.
 _YIELDING = (3e-4, 1.5e-3, 6e-3)
 
 
 def _presliding(trial: StartContext) -> Hypothesis:
-    """Begin with several ways before it slips, as a law without a break-away; no step skips its slipping."""
+    """Start with several pre-sliding distances and no break-away torque.
+
+    The relaxation time starts at one sample time, so that no step skips the break-away.
+    """
     _, way, relaxation = BRISTLES
     travel = max(float(np.ptp(x[trial.index].angle_rad)) for x in trial.at.turning)
     starts = tuple({way: share * max(travel, 1e-3)} for share in _YIELDING)
@@ -90,12 +95,12 @@ def _presliding(trial: StartContext) -> Hypothesis:
     )
 
 
-# Of the longest wave on a slide.
+# Smallest number of waves over the travel of a prismatic axis.
 _SLIDE_TURNS = 2.0
 
 
 def _waves(trial: StartContext) -> Hypothesis | None:
-    """Begin with the strongest orders of the residual over the motor angle."""
+    """Start with the strongest orders of the residual over the motor angle; None without any."""
     terms = trial.info.terms().values()
     orders = _orders(trial, len(terms))
     if not orders:
@@ -110,34 +115,35 @@ def _waves(trial: StartContext) -> Hypothesis | None:
 
 
 def _orders(trial: StartContext, count: int) -> list[int]:
-    """Return the strongest orders of the residual over the motor angle, as the effect shows in it."""
+    """Return the strongest orders of the residual over the motor angle, given the response to the effect."""
     logs, responses = trial.turned()
-    # On a slide, whose angle may be metres, a wave longer than the travel is any shape.
+    # The angle of a prismatic axis may be in metres. A wave longer than the travel could have any shape.
     least = _SLIDE_TURNS if trial.robot.axis_is_prismatic[trial.index] else 0.0
     return strongest_orders(logs, responses, count=count, least_turns=least)
 
 
-# As harmonic drives have it.
+# Order of a harmonic drive: two waves per motor turn.
 _TWICE = 2
 
 
 def _gear_waves(trial: StartContext) -> Hypothesis:
-    """Begin with the two strongest orders of the residual over the motor angle, else twice a motor turn."""
+    """Start with the two strongest orders of the residual over the motor angle, else with two waves per motor turn."""
     waves = tuple(p.name for p in trial.info.parameters if p.role == "amplitude")
     first, *others = _orders(trial, 2) or [_TWICE]
     values = {"order": float(first), "returned": 0.5, **dict.fromkeys(waves, 0.0)}
     values["second_ratio"] = others[0] / first if others else float(_TWICE)
-    # Gears conserve power or pass torque at the nominal ratio: either is as good a guess.
+    # A gear conserves power or passes torque at the nominal ratio; the start is midway.
     return Hypothesis(trial.effect(values), (*waves, "returned"), {"returned": (0.5, 0.5)})
 
 
-# An axis with less of the error than this is not worth many starts.
+# Share of the whole error up to which an axis gets no further start values.
 _SMALL_SHARE = 0.1
 
 
-# A tenth of it, where searches begin, is ten times the least that effects take.
+# Smallest deflection for start values [rad]. Searches begin at a tenth of it, ten times the smallest value that effects
+# accept.
 _LEAST_DEFLECTION_RAD = 1e-4
-# Play may be that of a gear that is bent far less; this is next to nothing.
+# Smallest deflection for backlash [rad], which may belong to a much stiffer gear; almost zero.
 _HARDLY_BENT_RAD = 1e-6
 
 
@@ -147,43 +153,47 @@ def _stiffness(trial: StartContext) -> float:
 
 
 def _deflection_rad(trial: StartContext, size: Callable[[Array], Any] = np.std) -> float:
-    """Return the deflection of the gear under the torque of the log that moves it most, by ``size``.
+    """Return the typical deflection of the gear [rad], under the torque of the log that moves it most.
 
-    Not less than what shapes of gears are stated for.
+    ``size``: measure of a torque series, by default its standard deviation. At least the smallest deflection for start
+    values.
     """
     return max(_bent_rad(trial, size), _LEAST_DEFLECTION_RAD)
 
 
 def _bent_rad(trial: StartContext, size: Callable[[Array], Any] = np.std) -> float:
-    """Return the same, however small."""
+    """Return the same deflection [rad] with a much smaller lower limit."""
     ratio = abs(float(trial.robot.gear_ratio[trial.index]))
     most = max(float(size(torque)) for torque in trial.torque())
     return max(most / ratio / _stiffness(trial), _HARDLY_BENT_RAD)
 
 
-# Beyond these shares of the samples torques say little of a gear's law.
+# Quantiles of the torque between which a gear law is fitted; rarer torques say little about it.
 _HARDLY_EVER = (0.005, 0.995)
 
 
 def _of_a_gear(trial: StartContext) -> Hypothesis:
-    """Begin at the neutral values, and say between which deflections the gear works."""
+    """Start at the neutral values, with the range of deflections in which the gear works."""
     torque = np.concatenate(trial.torque()) / float(trial.robot.gear_ratio[trial.index])
     low, high = np.quantile(torque / _stiffness(trial), _HARDLY_EVER)
     return replace(_neutral(trial), deflections_rad=(float(low), float(high)))
 
 
-# Largest half-width of the play of an industrial gear, 3 minutes of arc.
+# Largest half-width of the backlash of an industrial gear [rad]: 3 minutes of arc.
 _WIDEST_RAD = 9e-4
-# From one start to the next: the valley around the true width is narrow, impacts must stay in phase.
+# Ratio of neighbouring start widths. The minimum around the true width is narrow, because impacts must stay in phase.
 _WIDER = 1.24
 
 
 def _play(trial: StartContext) -> Hypothesis:
-    """Begin at several widths, from a share of the deflection the largest torque gives.
+    """Start at several half-widths of the backlash; at none on an axis with a small share of the error.
 
-    Up to most of it, or the play of a gear that is stiffer than that; by teeth that rebound, and by such as
-    a film of grease stops, whose motion is another where gravity lets them fall from side to side. What is
-    damped in the gap is found where it ended.
+    They begin at 4 % of the deflection under the torque's standard deviation. They end at 80 % of it, or on a rotating
+    axis at the largest half-width of industrial gears if that is more.
+
+    Some starts have teeth that rebound, some have teeth that a film of grease stops. The two move differently if
+    gravity lets the teeth fall from side to side. The damping in the gap is fitted later; see
+    `screening.restart_gear_law`.
     """
     i, deflection = trial.index, _bent_rad(trial)
     begin = replace(_of_a_gear(trial), free=("half_width_rad",))
@@ -199,17 +209,18 @@ def _play(trial: StartContext) -> Hypothesis:
     return replace(begin, starts=(*rebounding, *stopped))
 
 
-# A cube as stiff at the deflection as so many linear springs: near one, a step from none of it says little.
+# Stiffness of the cubic spring at the typical deflection, in linear stiffnesses. Near such a value, a linear step from
+# zero says little.
 _HARDER = (1.0, 3.0, 10.0, 30.0)
 
 
 def _with_weight(torque: Array) -> float:
-    """Return the size of a torque whose mean bends a spring as what varies does."""
+    """Return the rms of a torque: its mean bends a spring, too."""
     return float(np.sqrt(np.mean(torque**2)))
 
 
 def _hardening(trial: StartContext) -> Hypothesis:
-    """Begin without, or where the cube is most of the spring."""
+    """Start without a cubic spring, or where it is most of the stiffness."""
     begin = _of_a_gear(trial)
     if _axis_share(trial.at, trial.index) <= _SMALL_SHARE:
         return begin
@@ -217,20 +228,20 @@ def _hardening(trial: StartContext) -> Hypothesis:
     return replace(begin, starts=tuple({"cubic_nm_rad3": share * unit} for share in _HARDER))
 
 
-# Where slipping begins in earnest, as shares of the deflection: far below, it is dry friction;
-# far above, a stiffer spring.
+# Deflection at which slipping begins, as shares of the typical deflection: far below it equals dry friction, far above
+# a stiffer spring.
 _SLIPS = (0.1, 0.4, 1.6)
 
 
 def _slip(trial: StartContext) -> Hypothesis:
-    """Begin at several deflections at which the gear slips."""
+    """Start at several deflections at which the gear slips."""
     name, deflection = "deflection_rad", _deflection_rad(trial)
     less, first, *more = ({name: share * deflection} for share in _SLIPS)
     bounds = {name: (0.1 * _SLIPS[0] * deflection, 10 * _SLIPS[-1] * deflection)}
     begin = trial.effect(
         {"share": 0.0, "included": 0.5, "sharpness": 0.5, "strain_at_rest": 0.0, **first}
     )
-    # Stiffness comes from small motions, which feel the whole spring, or from large ones.
+    # The known stiffness comes from small motions, with the whole spring, or from large ones: either is possible.
     return Hypothesis(
         begin,
         ("share", name, "included", "sharpness", "strain_at_rest"),
@@ -240,12 +251,12 @@ def _slip(trial: StartContext) -> Hypothesis:
     )
 
 
-# Where a gear's stiffness has its knee, as shares of the deflection.
+# Deflection at which the stiffness changes, as shares of the typical deflection.
 _KNEES = (0.1, 0.35, 1.2)
 
 
 def _knee(trial: StartContext) -> Hypothesis:
-    """Begin at several deflections beyond which the gear is another spring."""
+    """Start at several deflections beyond which the stiffness differs."""
     name, deflection = "knee_rad", _deflection_rad(trial)
     starts = tuple({name: share * deflection} for share in _KNEES)
     bounds = {name: (0.3 * starts[0][name], 3 * starts[-1][name])}
@@ -254,21 +265,21 @@ def _knee(trial: StartContext) -> Hypothesis:
     return replace(_of_a_gear(trial), effect=begin, bounds=bounds, starts=further)
 
 
-# Half-widths of a soft middle, as shares of the deflection: its corner has to be passed.
+# Half-widths of a soft middle, as shares of the typical deflection: the gear must leave the middle to show it.
 _MIDDLES = (0.05, 0.15, 0.45)
-# Teeth that come into contact one after another, and all at once.
+# Rounding of the edge: for teeth that come into contact one after another, and for teeth that do so at once.
 _ROUNDED = (0.5, 0.05)
 
 
 def _soft(trial: StartContext) -> Hypothesis:
-    """Begin at several widths of a middle that is as stiff as the rest."""
+    """Start at several widths of the middle, with the same stiffness there as outside."""
     name, deflection = "half_width_rad", _deflection_rad(trial)
     starts = [
         {name: share * deflection, "rounding": rounding}
         for rounding in _ROUNDED
         for share in _MIDDLES
     ]
-    # The largest torques turn a gear by several times its deviation.
+    # The largest torques deflect a gear by several times the standard deviation.
     bounds = {name: (0.3 * starts[0][name], 10 * starts[-1][name])}
     begin = trial.effect({"softness": 0.0, **starts[1]})
     further = (starts[0], *starts[2:])
@@ -276,43 +287,44 @@ def _soft(trial: StartContext) -> Hypothesis:
 
 
 def _coupled(trial: StartContext) -> Hypothesis | None:
-    """Begin without a turn that one axis gives the next; a rigid gear cannot be turned along.
+    """Start without coupling from one axis to the next; None if the next axis has a rigid gear.
 
-    Friction of both is not free: one law of two axes takes the place of several of one.
+    Friction of the two axes is not free here. The coupling replaces several effects of single axes.
     """
-    assert isinstance(trial.place, tuple)  # by its scope
+    assert isinstance(trial.place, tuple)  # guaranteed by the scope of the effect
     if trial.robot.axis_is_rigid[trial.place[1] - 1]:
         return None
     return Hypothesis(_neutral(trial).effect, ("share",))
 
 
 def _axis_share(at: StartData, index: int) -> float:
-    """Return the share of the residual error on an axis [1]."""
+    """Return the share of one axis (from 0) in the whole squared residual [1]."""
     logs = zip(*at.turning, strict=True)
     squares = [sum(float(log.residual @ log.residual) for log in axis) for axis in logs]
     return squares[index] / max(sum(squares), 1e-300)
 
 
-# Limits that are looked at, as shares of the largest torque.
+# Torque limits that are tried, as shares of the largest torque.
 _LIMITS = np.geomspace(0.05, 0.98, 40)
-# Share of the time that a law may command more, of positions that lag behind by it.
+# Share of the samples whose torque exceeds the limit, for start values where positions are compared: there the
+# controller may command more than the motor gives.
 _BEYOND = (0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002)
 
 
 def _limit(trial: StartContext) -> Hypothesis:
-    """Begin at the limit beyond which the torque explains most of the residual: a command makes up for what is cut."""
+    """Start at the torque limit that explains most of the residual; commands compensate for the missing torque."""
     return _limit_by(trial, -1.0)
 
 
 def _limit_of_targets(trial: StartContext) -> Hypothesis:
-    """Begin likewise where positions are compared: what is cut they lack, and commands wind up beyond it."""
+    """Start at a torque limit where positions are compared: they lack the missing torque, and commands wind up."""
     found = _limit_by(trial, 1.0)
     levels = np.quantile(np.abs(np.concatenate(trial.torque())), 1 - np.array(_BEYOND))
     return replace(found, starts=tuple({"limit_nm": float(level)} for level in levels))
 
 
 def _limit_by(trial: StartContext, sign: float) -> Hypothesis:
-    """Begin at the limit beyond which the torque, times ``sign``, goes with most of the residual."""
+    """Start at the limit for which the torque beyond it, times ``sign``, explains most of the residual."""
     torques = trial.torque()
     limits = _LIMITS * max(float(np.abs(torque).max()) for torque in torques)
     along, power = np.zeros(len(limits)), np.zeros(len(limits))
@@ -331,17 +343,17 @@ def _limit_by(trial: StartContext, sign: float) -> Hypothesis:
 
 
 def _lifts(robot: Robot) -> bool:
-    """Whether gravity turns the first joint."""
+    """Whether gravity acts about the first joint."""
     lever = np.cross(robot.joints[0].axis, robot.gravity_m_s2)
     return not robot.joints[0].prismatic and bool(np.linalg.norm(lever) > _SMALL_SHARE)
 
 
 def _point_mass(trial: StartContext) -> Hypothesis | None:
-    """Begin at the centre of mass of the last link that has one, or beside it.
+    """Start at the centre of mass of the last link that has one, and at points beside it.
 
-    There a mass is one of the link, which the re-fit may have all of; beside it, it is not. Of a single
-    axis that lifts it, it is as good as a link that is heavier or has another centre, which is said where
-    it leads; one that does not lift it shows no more than an inertia.
+    A mass at the centre may equal a wrong link mass, which the re-fit can absorb; beside it, it cannot. With a single
+    axis that lifts it, a payload equals a heavier link or another centre of mass; the diagnosis says so where it leads.
+    A single axis that does not lift it shows only an inertia: then None.
     """
     joints = trial.robot.joints
     links = [j.link for j in joints if j.link is not None]
@@ -350,9 +362,9 @@ def _point_mass(trial: StartContext) -> Hypothesis | None:
     x, y, z = links[-1].com_m
     reach = sum(float(np.linalg.norm(j.origin_m)) for j in joints) or 1.0
     centre = {"x_m": float(x), "y_m": float(y), "z_m": float(z)}
-    # Tools reach about as far as the last links do.
+    # Prior spread of the place: tools reach about as far as the last links.
     spread = 0.3 * reach
-    # What is taken off a link leaves some of it, re-fitted or not.
+    # A negative mass must leave part of the link.
     top = next(p.upper for p in trial.info.parameters if p.name == "mass_kg")
     beside = [
         {**centre, name: value + side * 0.5 * spread}
@@ -369,18 +381,18 @@ def _point_mass(trial: StartContext) -> Hypothesis | None:
 
 
 def _pulling_back(trial: StartContext) -> Hypothesis:
-    """Begin at the neutral value; what pushes on is no cable, but gravity that is not balanced."""
+    """Start at the neutral value. A negative stiffness would be unbalanced gravity, not a cable."""
     stiffness = trial.info.parameters[0]
     return replace(_neutral(trial), bounds={stiffness.name: (0.0, stiffness.upper)})
 
 
 def _balancer(trial: StartContext) -> Hypothesis | None:
-    """Begin at the neutral values; what slides has no angle that gravity turns with."""
+    """Start at the neutral values; None for a prismatic axis, whose angle does not turn gravity."""
     return None if trial.robot.axis_is_prismatic[trial.index] else _neutral(trial)
 
 
-# Over less of a wave it is as good as a constant and a slope, and how many waves there may be; how far
-# a fit goes from the one that is found, and with how much of its wave it begins.
+# Phase of the slowest and the fastest wave over the travel [rad]: less than 1.5 rad equals a constant and a slope. Then
+# the factor by which a fit may change the order, and the share of the estimated wave at the start.
 _LEAST_TURN_RAD = 1.5
 _MOST_TURNS_RAD = 15.0
 _NEAR = 3.0
@@ -388,7 +400,7 @@ _BEGUN = 0.3
 
 
 def _uneven(trial: StartContext) -> Hypothesis | None:
-    """Begin as a law, with the wave of the residual's dry friction over the motor angle, where there is one."""
+    """Start as a friction law, with the strongest wave of dry friction over the motor angle; None without one."""
     if (
         trial.robot.axis_is_prismatic[trial.index]
         or _axis_share(trial.at, trial.index) <= _SMALL_SHARE
@@ -403,7 +415,7 @@ def _uneven(trial: StartContext) -> Hypothesis | None:
     if wave is None:
         return None
     order, cosine, sine = wave
-    # An order has no slope where its wave is zero; from the middle a fit finds either side of the gear.
+    # Without a wave, its order has no gradient. Half of the friction behind the gear lets a fit move it to either side.
     begin = _law(smoothing_rad_s=_SMOOTHING)(trial).at(
         {
             "order": order,
@@ -416,14 +428,14 @@ def _uneven(trial: StartContext) -> Hypothesis | None:
     return replace(begin, bounds=bounds, starts=())
 
 
-# From the slowest swing that ten seconds show to those that gears have themselves; a swing is found
-# from as far away as its resonance is wide.
+# Frequencies [Hz] from the slowest swing that ten seconds of data show to those of the gears themselves; and the
+# damping ratio, since a fit finds a resonance from about its width away.
 _SWINGS_HZ = tuple(float(f) for f in np.geomspace(3.0, 40.0, 12))
 _WIDTH = 0.1
 
 
 def _swing(trial: StartContext) -> Hypothesis:
-    """Begin at several frequencies, where there is much to explain."""
+    """Start at several frequencies, if the axis has a large share of the error."""
     begin = _neutral(trial)
     worth_it = _axis_share(trial.at, trial.index) > _SMALL_SHARE
     starts = tuple({"frequency_hz": f} for f in _SWINGS_HZ) if worth_it else ()
@@ -435,12 +447,12 @@ def _swing(trial: StartContext) -> Hypothesis:
     )
 
 
-# Bases of arms rock from here to there; stiffer ones show less.
+# Frequencies of a rocking base [Hz]; stiffer bases hardly show.
 _ROCKS_HZ = (6.0, 12.0, 24.0)
 
 
 def _rocking(trial: StartContext) -> Hypothesis | None:
-    """Begin with a base that swings at several frequencies, where there is much to explain."""
+    """Start with a base that rocks at several frequencies, if an axis has a large share of the error."""
     share = max(_axis_share(trial.at, i) for i in range(trial.robot.n_axes))
     names = [p.name for p in trial.info.parameters if p.role == "amplitude"]
     inertia = _inertia_about_base(trial.robot)
@@ -451,7 +463,7 @@ def _rocking(trial: StartContext) -> Hypothesis | None:
         compliance = 1.0 / (inertia * (2 * np.pi * frequency_hz) ** 2)
         return dict(zip(names, compliance.tolist(), strict=True))
 
-    # Stiffer, nothing shows and the spring is hard to integrate; softer, the arm would fall over.
+    # A stiffer base shows nothing and is slow to integrate; on a softer one the arm would fall over.
     bounds = {n: (0.02 * c, 100 * c) for n, c in swinging(_ROCKS_HZ[-1]).items()}
     free = tuple(p.name for p in trial.info.parameters)
     begin = Hypothesis(trial.effect(swinging(_ROCKS_HZ[-1])), free, bounds=bounds)
@@ -459,7 +471,7 @@ def _rocking(trial: StartContext) -> Hypothesis | None:
 
 
 def _inertia_about_base(robot: Robot) -> Array:
-    """Return the inertia about x and y of the base (2,) [kg m^2], links as points."""
+    """Return the inertia about x and y of the base (2,) [kg m^2], with links as point masses."""
     q = np.zeros(robot.n_joints)
     q[robot.axis_joints] = robot.operating_point
     out = np.zeros(2)
@@ -471,44 +483,46 @@ def _inertia_about_base(robot: Robot) -> Array:
     return out
 
 
-# Of the longest log: over less it is viscous friction, over more it does not show.
+# Smallest, first and largest time constant, as shares of the longest log: a shorter warm-up equals viscous friction, a
+# longer one does not show.
 _WARM = (0.25, 0.5, 10.0)
 
 
 def _warming(trial: StartContext) -> Hypothesis:
-    """Begin without, half a log to warm up."""
+    """Start without warm-up, with a time constant of half the longest log."""
     longest = max(float(log.time_s[-1]) for log in trial.logs)
     least, middle, most = (share * longest for share in _WARM)
     begin = _neutral(trial).at({"time_constant_s": middle})
     return replace(begin, bounds={"time_constant_s": (least, most)})
 
 
-# Farther off, a link is not mistaken but another one, and something else is the likelier cause.
+# Range of the relative change of a link's mass or inertia [1], and of the shift of its centre of mass [m]. A larger
+# difference means another link, and another cause is more likely.
 _DOUBLE = (-0.6, 1.0)
 _DISTANCE_M = 0.5
 
 
 def _link_share(trial: StartContext) -> Hypothesis:
-    """Begin at the neutral value; a link is at most twice what it was modelled as."""
+    """Start at the neutral value; a link is at most twice as heavy as in the model."""
     return replace(_neutral(trial), bounds={p.name: _DOUBLE for p in trial.info.parameters})
 
 
 def _link_place(trial: StartContext) -> Hypothesis:
-    """Begin at the neutral values, and stay on the link."""
+    """Start at the neutral values, within 0.5 m."""
     reach = (-_DISTANCE_M, _DISTANCE_M)
     return replace(_neutral(trial), bounds={p.name: reach for p in trial.info.parameters})
 
 
 def _shown_by_logs(_trial: StartContext) -> None:
-    """Offer nothing: controllers, clocks and steps are algebra of the logs, no fit of a machine."""
+    """Return None: controllers, clocks and sensor steps follow algebraically from the logs, without a fit."""
 
 
-def _as_its_twin(_trial: StartContext) -> None:
-    """Offer nothing: an effect that is tried gives the very same logs."""
+def _equal_to_another(_trial: StartContext) -> None:
+    """Return None: another effect that is tried gives exactly the same logs."""
 
 
 def _read_late(trial: StartContext) -> Hypothesis | None:
-    """Begin with none; of an axis alone a delay of the drive gives the very same logs."""
+    """Start without delay; None for a single axis, where a delay of the drive gives exactly the same logs."""
     return _neutral(trial) if trial.robot.n_axes > 1 else None
 
 
@@ -552,10 +566,10 @@ STARTS: Mapping[str, Callable[[StartContext], Hypothesis | None]] = {
     "joint_zero_offset": _neutral,
     "torque_sensor_gain": _shown_by_logs,
     "sensor_delay": _read_late,
-    "torque_sensor_offset": _as_its_twin,
+    "torque_sensor_offset": _equal_to_another,
     "feedforward_missing": _shown_by_logs,
     "current_loop": _neutral,
-    "link_geometry": _before_the_last,
+    "link_geometry": _not_last_link,
     "lost_motion": _soft,
     "encoder_eccentricity": _neutral,
     "power_supply_sag": _neutral,
@@ -564,18 +578,19 @@ STARTS: Mapping[str, Callable[[StartContext], Hypothesis | None]] = {
     "position_quantization": _shown_by_logs,
     "rotor_inertia": _neutral,
 }
-"""By effect."""
+"""Start of each effect, by its name."""
 
-# Where positions alone are compared, nothing shows at what speed friction turns round; a law that turns
-# within a sample chatters.
+# Smoothing of dry friction where positions are compared, as a share of the top speed. Positions do not show at which
+# speed friction changes sign, and a law that changes within one sample chatters.
 _TURNS_SLOWLY = 0.05
 
 
 def _gain_of_position(trial: StartContext) -> Hypothesis:
-    """Begin at the neutral values; another gain of speed is viscous friction, which is tried as such.
+    """Start at the neutral values, with those controller gains free that no other effect imitates.
 
-    But of a cascade with an integral, whose gains all act on one error: without one, another gain of speed is
-    a torque constant.
+    - Controller without ``kv``: the proportional gain. A wrong speed gain equals viscous friction.
+    - Cascade without an integral: the position gain. A wrong speed gain equals a wrong torque constant.
+    - Cascade with an integral: all gains, since all act on one error.
     """
     found, gains = _neutral(trial), trial.robot.controller_gains
     proportional, _, position = found.free
@@ -590,10 +605,10 @@ TARGET_STARTS: Mapping[str, Callable[[StartContext], Hypothesis | None]] = {
     "coulomb_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
     "asymmetric_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
     "load_dependent_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
-    # Nor whether it yields before it slips.
+    # Positions do not show pre-sliding.
     "presliding_friction": lambda _trial: None,
-    # No logged torque tells a controller: a fit has to.
+    # Without a logged torque, only a fit can show a wrong controller.
     "controller_gain": _gain_of_position,
     "torque_saturation": _limit_of_targets,
 }
-"""Of those that begin otherwise where positions are compared under the same targets."""
+"""Start of each effect that differs where positions are compared under the same targets."""
