@@ -1,1 +1,1 @@
-"""Where the gap lies, how far it shrinks on validation logs, and what they would have shown."""
+"""Measures where the gap lies, how far it shrinks on validation logs, and which effects these logs would show."""

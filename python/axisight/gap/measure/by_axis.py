@@ -1,8 +1,7 @@
-"""What explains one axis is believed there, though other axes keep a gap that nothing explains.
+"""Accepts causes axis by axis, if other axes keep a gap that nothing explains.
 
-By inverse dynamics the error of an axis is its own: friction missing on axis 1 is none the less sure
-for a wrist that no effect describes. The arm as a whole stays *unknown*, and the causes stand beside
-it.
+In inverse dynamics the error of an axis is its own. Friction missing on axis 1 is no less sure if no effect explains
+the wrist. The verdict for the whole arm stays *unknown*, and the causes are reported beside it.
 """
 
 from __future__ import annotations
@@ -19,16 +18,16 @@ from axisight.gap.fit.settling import settled
 from axisight.gap.measure.gap_figures import Stage
 from axisight.gap.search.state import SearchState
 
-# Share of what causes change on validation logs, in squares, by which they have to lower the gap
-# there: 1 where they are right, 0 where half of their size would be, -1 where they have nothing to
-# do with it. A motion that asks little of an effect changes little, and is asked for little.
+# Smallest fall of the squared gap on validation logs, as a share of the squared torque change by the causes. The ratio
+# is 1 for a correct cause, 0 if the true size is half of it, and -1 for an unrelated one. A motion that hardly excites
+# an effect changes little, and needs to show little.
 _CARRIED = 0.25
 
 
 def believed_by_axis(found: SearchState, fitter: ModelFitter, settings: Settings) -> SearchState:
-    """Return the search with the causes of those axes only that they explain well enough.
+    """Return the search with only the causes of axes that they explain well enough.
 
-    Unchanged where errors of axes do not add up, and where no axis is explained.
+    Unchanged if the errors of the axes do not add up (closed loop), or if no axis is explained.
     """
     if not fitter.adds_up or not found.accepted:
         return found
@@ -41,9 +40,9 @@ def believed_by_axis(found: SearchState, fitter: ModelFitter, settings: Settings
 
 
 def without_axis(found: SearchState, fitter: ModelFitter, axis: int) -> SearchState:
-    """Return the search without the causes that stood first on ``axis`` (from 0).
+    """Return the search without the causes that led ``axis`` (from 0).
 
-    The others explain their axes; whether they explain the arm does not matter any more.
+    The other causes explain their axes, whatever the share of the whole arm that they explain.
     """
     left = {s.axis for _, s in found.accepted} - {axis}
     return replace(_of_axes(found, fitter, left), by_axis=True)
@@ -60,10 +59,9 @@ def _of_axes(found: SearchState, fitter: ModelFitter, axes: set[int]) -> SearchS
 
 @dataclass(frozen=True)
 class OwnAxes:
-    """How causes fare on the ``axes`` (from 0) they explain, on the validation logs.
+    """Errors on the validation logs that show whether causes hold on the ``axes`` (from 0) that they explain.
 
-    ``given``, ``after``: the error of the simulator as given and with the causes; ``change``: what
-    the causes change of its torque.
+    ``given``, ``after``: errors of the simulator as given and with the causes; ``change``: torque change by the causes.
     """
 
     axes: Sequence[int]
@@ -72,7 +70,7 @@ class OwnAxes:
     change: Stage
 
     def not_carried(self) -> int | None:
-        """Return the first axis (from 0) whose gap does not fall as the causes say; or None."""
+        """Return the first axis (from 0) whose gap falls less than its causes promise; None if there is none."""
         given, after, change = (
             np.mean(s.per_log(), axis=0) for s in (self.given, self.after, self.change)
         )

@@ -1,8 +1,7 @@
-"""What is left to chance where the machine with its causes chatters.
+"""Raises the floor of a machine that chatters: two of its runs differ by more than sensor noise.
 
-A joint that knocks through its play, say, takes another course at the least disturbance. Two runs of
-one motion on one machine then differ by far more than the noise of their sensors, and no simulator
-can come closer to a run than another run does.
+A joint that knocks through its backlash, for example, takes another course at the smallest disturbance. No simulator
+can come closer to a run than another run of the same machine does.
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ from axisight.logs import Log
 
 Array = NDArray[np.float64]
 
-# Squares by which the gap with the causes may exceed the floor before anyone asks why, and by which
-# noise on a machine that chatters has to exceed that on one which does not.
+# Smallest ratio of mean squares: of the gap with the causes to the floor before chatter is considered, and of a
+# chattering machine's noise to that floor.
 _ABOVE = 1.1
-# Share of the explainable error that causes have to remove where a simulator is kept on the validation
-# logs: there it does not stray, and chance explains nothing.
+# Share of the explainable error that the causes must remove if the simulator is kept on the validation logs. There it
+# cannot drift onto another course, so chatter explains nothing.
 _FOLLOWED = 0.95
 
 
@@ -39,11 +38,15 @@ def with_chance(
     causes: Variant,
     measure: Callable[[Sequence[Array]], Stage],
 ) -> Stages:
-    """Return the stages with the floor of the machine with its ``causes``, where that chatters.
+    """Return the stages with the floor of the machine with its ``causes``, if that machine chatters.
 
-    Unchanged where the gap with them stands at the floor as it is, where noise makes no more of
-    itself on that machine, or more than there was to explain, and where the causes do not hold on ``logs``
-    that the simulator is kept on.
+    Unchanged in any of these cases:
+
+    - The gap with the causes is at the floor.
+    - Noise moves the machine with its causes no further, or further than the gap of the re-fitted simulator.
+    - The causes do not explain ``logs`` if the simulator is kept on them.
+
+    ``measure``: returns the stage of torque errors (n, n_axes) [Nm] of each log.
     """
     least = _ABOVE * stages.floor.mean()
     if not causes.effects or stages.after.mean() <= least:
@@ -55,7 +58,7 @@ def with_chance(
 
 
 def chance_check(stages: Stages, judged: Stages) -> tuple[str, ...]:
-    """Say how far two runs differ, where ``judged`` has another floor than ``stages``."""
+    """Return a sentence on the difference of two runs if ``judged`` has another floor than ``stages``; else nothing."""
     if judged is stages:
         return ()
     apart = percent(float(np.sqrt(judged.floor.mean())))

@@ -1,8 +1,8 @@
-"""Detection limits: the smallest amplitude of an effect that these logs would have shown.
+"""Detection limits: the smallest amplitude of an effect that these logs would show.
 
-A simulator that lacks an amplitude leaves a loss, however it is re-fitted within its bounds. The
-effect is found where that is as much as a cause has to be worth, and noise does not take it below:
-a loss ``d`` that falls scatters by ``2 sqrt(d s)``, with ``s`` the mean square of the residual.
+A simulator that lacks an amplitude leaves a loss after every re-fit within its bounds. The effect is found if this loss
+reaches the threshold for a cause in spite of noise. With ``s`` the mean square of the residual, a fall of the loss by
+``d`` scatters by ``2 sqrt(d s)``.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from axisight.statistics.tails import normal_deviate
 
 Array = NDArray[np.float64]
 
-# An amplitude at its limit is found with this probability.
+# Probability to find an amplitude at its limit.
 _POWER = 0.95
-# Sizes that are looked at, of the usual one, and how well a limit is found.
+# Range of the search, as factors of an effect's typical amplitude, and the relative precision of a limit.
 _SPAN = (1e-5, 1e5)
 _PRECISION = 0.02
 
 
 def detection_limits(found: SearchState, view: View) -> tuple[DetectionLimit, ...]:
-    """Return the limit of every effect at every place that is no cause.
+    """Return the limit of every effect that is no cause, at every place.
 
-    On the axis where it shows best, with all causes in. Competition between effects that look alike
-    is not in it: at the limit something is seen; what it is may need more.
+    It holds on the axis where the effect shows best, with all causes in the model. At the limit a gap is detected. To
+    tell the effect from its look-alikes may need a larger amplitude.
     """
     named = {e.label for e in found.model.effects}
     known = {**found.sensitivities, **_not_tried(found, view)}
@@ -53,9 +53,9 @@ def detection_limits(found: SearchState, view: View) -> tuple[DetectionLimit, ..
 def loss_that_shows(
     found: SearchState, settings: Settings, cost: float, more: Array | float = 1.0
 ) -> Array:
-    """Return the loss on each axis (n_axes,) with which a missing effect shows, nineteen times of twenty.
+    """Return the loss on each axis (n_axes,) at which a missing effect shows with 95 % probability.
 
-    ``cost``: fitted numbers of it; ``more``: times as much data as there are, of each axis or of all.
+    ``cost``: number of its fitted parameters; ``more``: factor on the amount of data, by axis or for all.
     """
     loss = more * found.layout.by_axis(held_out_loss(found.model))
     samples = more * found.layout.samples()
@@ -67,7 +67,7 @@ def loss_that_shows(
 
 
 def _not_tried(found: SearchState, view: View) -> dict[str, Sensitivity]:
-    """Return the sensitivities of candidates on axes where nothing was to be explained."""
+    """Return the sensitivities of candidates on axes that the search did not try, since they had no gap."""
     tried = {s.option.effect.axis for s in found.sensitivities.values()}
     axes = [axis for axis in view.robot.axis_numbers() if axis not in tried]
     if not axes:
@@ -93,7 +93,7 @@ def _order(sensitivity: Sensitivity) -> tuple[str, int]:
 def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
     """Return the limit of a candidate.
 
-    ``shows`` (n_axes,): loss that is seen; ``tolerated``: change of the quantity that is scatter.
+    ``shows`` (n_axes,): smallest loss that shows; ``tolerated``: size up to which the effect is within a tolerance.
     """
     effect = s.option.effect
     place = effect.first_axis
@@ -107,11 +107,11 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
         return float(np.max(np.sqrt(s.losses(float(np.exp(log_size))) / shows))) - 1.0
 
     low, high = np.log(info.typical * _SPAN[0]), np.log(min(largest, info.typical * _SPAN[1]))
-    # Where no parameter meets its bound what is missing grows as the size does; where one does, faster.
+    # Without a parameter at its bound, the root of the loss is proportional to the size; with one, it grows faster.
     with np.errstate(divide="ignore"):
         at_most = low - float(np.log1p(missing(low)))
     if at_most > high and missing(high) < 0.0:
-        # Larger than the effect can be: these logs do not show it at all.
+        # The limit is larger than the effect can be: these logs do not show it at all.
         hidden = _hides(s, float(np.exp(high)), shows)
         return DetectionLimit(
             effect.name, place, s.parameter, None, info.unit, effect.axes, others, hidden
@@ -130,14 +130,14 @@ def _limit(s: Sensitivity, shows: Array, tolerated: float) -> DetectionLimit:
 
 
 def _hides(s: Sensitivity, size: float, shows: Array) -> Hidden:
-    """Return what hides a size of an effect: whether it would show while nothing makes up for it."""
+    """Return what hides an effect of this size: tolerances if it would show without compensation, else the motion."""
     return "tolerances" if np.any(s.unfitted(size) > shows) else "motion"
 
 
 def _of_a_stiffer_gear(softer: float) -> float | None:
-    """Return the relative change of a stiffness that a relative change of its compliance is.
+    """Return the relative increase of a stiffness for a relative decrease of its compliance; None from 0.5.
 
-    That is what shows, and a gear that gives nothing at all is the most of it: None where twice the
-    change would be more.
+    Logs show the compliance, which can decrease by at most 1, to a rigid gear. No limit is given from half of that,
+    where the stiffness doubles.
     """
     return None if softer >= 0.5 else softer / (1.0 - softer)

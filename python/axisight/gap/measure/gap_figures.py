@@ -1,4 +1,4 @@
-"""How far the gap shrinks, on the validation logs only."""
+"""Computes how far the gap shrinks, on the validation logs only."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Stage:
-    """Squared relative errors of one simulator, per log as block means (n_blocks, n_axes).
+    """Squared relative errors of one simulator, as block means (n_blocks, n_axes) of each log.
 
     ``pooled``: sqrt(sum e^2 / sum u^2) over all samples, axes and logs, as in `Pooled` [1].
     """
@@ -36,7 +36,10 @@ class Stage:
         return float(np.mean(self.per_log()))
 
     def resampled(self, picks: Sequence[NDArray[np.int64]]) -> Array:
-        """Return the same of resampled blocks (n_draws,), from numbers (n_draws, n_blocks) of each log."""
+        """Return the mean square of resampled blocks (n_draws,).
+
+        ``picks``: for each log, the numbers (n_draws, n_blocks) of the drawn blocks.
+        """
         return np.asarray(
             np.mean(
                 [b.mean(axis=1)[p].mean(axis=1) for b, p in zip(self.blocks, picks, strict=True)],
@@ -53,7 +56,7 @@ def stage(
 ) -> Stage:
     """Return the stage of a simulator from its torque errors (n, n_axes) [Nm] on each log.
 
-    ``measured``: the torque errors are taken from, (n, n_axes) of each log; default as logged.
+    ``measured``: torques (n, n_axes) [Nm] that the errors refer to, by default those of the logs.
     """
     blocks = []
     torques = [log.torque_nm for log in logs] if measured is None else measured
@@ -69,9 +72,9 @@ def stage(
 
 @dataclass(frozen=True)
 class Stages:
-    """The simulator as given, re-fitted, with the causes; and what a perfect one would leave.
+    """Errors of the simulator as given, re-fitted and with the causes, and of a perfect one (``floor``).
 
-    ``open``: what it may leave beyond that, where torques cannot be known; None where nothing is open.
+    ``open``: further error that a perfect simulator may leave if torques cannot be known; None if they are.
     """
 
     given: Stage
@@ -83,10 +86,10 @@ class Stages:
 
 
 def gap_figures(stages: Stages, *, one_unit: bool = True) -> Gap:
-    """Return the gap before, re-fitted and after, and its floor.
+    """Return the gap as given, re-fitted and with the causes, and the floor.
 
-    ``one_unit``: whether all axes are driven by torques, or all by forces; what is pooled over
-    both would mean nothing.
+    ``one_unit``: whether all axes are driven by torques, or all by forces. With both, pooled figures have no meaning
+    and are left out.
     """
     every = (stages.given, stages.refitted, stages.after, stages.floor)
     (before, before_axes), (refit, refit_axes), (left, left_axes), (noise, noise_axes) = (
@@ -112,9 +115,8 @@ def gap_reduction(
 ) -> Interval:
     """Return the share of the explainable gap removed from ``earlier`` to ``later``.
 
-    (earlier^2 - later^2) / (given^2 - floor^2), clipped to [0, 1], with a 95 %
-    interval from resampling blocks of the logs with replacement (block
-    bootstrap; Künsch 1989, Annals of Statistics 17(3)).
+    (earlier^2 - later^2) / (given^2 - floor^2), clipped to [0, 1], with a 95 % interval from resampling blocks of the
+    logs with replacement (block bootstrap; Künsch 1989, Annals of Statistics 17(3)).
     """
     rng = np.random.default_rng([seed, 0x676170])
     picks = [rng.integers(0, len(b), (draws, len(b))) for b in given.blocks]
@@ -130,7 +132,7 @@ def gap_reduction(
     return Interval(value, float(min(low, value)), float(max(high, value)))
 
 
-# Points of an overlay, from which figures keep the least and the largest of each pixel.
+# Points of an overlay. A figure draws the smallest and the largest value of each pixel.
 _OVERLAY_POINTS = 10_000
 
 
@@ -148,7 +150,8 @@ def overlays(
     squares = zip(*(s.per_log() for s in stages), strict=True)
     for log, before, after, (given, left) in zip(logs, *simulated, squares, strict=True):
         step = max(1, log.n_samples // _OVERLAY_POINTS)
-        # What the simulated torques are subtracted from, and not the log: one filter for both sides.
+        # The filtered measured torque, from which errors are computed, not the raw log: both sides pass the same
+        # filter.
         measured, counted = view.measured(log), view.counted(log)
         std = np.std(log.torque_nm, axis=0)
         out += [

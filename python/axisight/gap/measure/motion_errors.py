@@ -1,4 +1,4 @@
-"""Errors of position and velocity where positions are compared: what the figures in torque are made of."""
+"""Errors of position and velocity if positions are compared; torque figures are derived from them."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from axisight.simulation import white_noise
 
 Array = NDArray[np.float64]
 
-# Samples of the controller that say a speed: of a cubic, which an answer to a step of a target needs.
+# Controller samples from which a speed is computed: a cubic needs four, and a step response needs a cubic.
 _POINTS = 4
-# Of a sample.
+# Rounding tolerance, in samples.
 _ROUNDING = 1e-6
-# What a check of the logs calls a velocity that is not the position's.
+# Name of the finding of the log checks for a velocity that does not match the position.
 _OFF = "velocity_inconsistent"
 
 
 def velocity_from(logs: Sequence[Log], noted: Sequence[Finding]) -> VelocityFrom:
-    """Return where velocities come from: all logs have them, and none is off its position; or positions."""
+    """Return the source of velocities: the logs, if all have one that matches its position; else the positions."""
     off = any(finding.name == _OFF for finding in noted)
     known = all(log.velocity_rad_s is not None for log in logs)
     return "logged" if known and not off else "positions"
@@ -39,9 +39,9 @@ def velocity_from(logs: Sequence[Log], noted: Sequence[Finding]) -> VelocityFrom
 def motion_errors(
     view: View, logs: Sequence[Log], refitted: Variant, after: Variant, source: VelocityFrom
 ) -> MotionErrors | None:
-    """Return the errors of position and velocity on logs; None where torques are compared.
+    """Return the errors of position and velocity on logs; None if torques are compared.
 
-    ``refitted`` and ``after`` are the simulators of these stages, ``source`` says where velocities come from.
+    ``refitted`` and ``after``: the simulators of these stages; ``source``: the source of measured velocities.
     """
     if not isinstance(view, TargetsView):
         return None
@@ -54,7 +54,7 @@ def motion_errors(
 def _errors(
     view: TargetsView, variant: Variant, logs: Sequence[Log], source: VelocityFrom
 ) -> tuple[list[Array], list[Array]]:
-    """Return errors of position [rad] and velocity [rad/s] of a simulator at the samples of each log."""
+    """Return errors (n, n_axes) of position [rad] and velocity [rad/s] of a simulator at the samples of each log."""
     position, velocity = [], []
     for log, found in zip(logs, view.positions(variant, logs), strict=True):
         error = view.off_by(found, log)
@@ -71,13 +71,13 @@ def _errors(
 def _noises(
     view: TargetsView, logs: Sequence[Log], source: VelocityFrom
 ) -> tuple[list[Array], list[Array]]:
-    """Return the same of noise of the sensors alone; that of a logged velocity is taken as white."""
+    """Return the same errors from sensor noise alone; noise of a logged velocity counts as white."""
     position = view.position_noises(logs, len(view.logs))
     if source == "positions":
         return position, [slope(x, view.logged_s) for x in position]
     seed, velocity = view.settings.seed, []
     for run, log in enumerate(logs, start=len(view.logs)):
-        assert log.velocity_rad_s is not None  # logged
+        assert log.velocity_rad_s is not None  # guaranteed by the source
         measured = np.ascontiguousarray(log.velocity_rad_s[:: view.step])
         noise = white_noise(seed, run, *measured.shape)
         velocity.append(view.passed(noise * white_std(measured, view.logged_s)))
@@ -85,25 +85,25 @@ def _noises(
 
 
 def slope(values: Array, time_s: float, lag_s: float = 0.0) -> Array:
-    """Return the derivative of samples (n, n_axes), ``lag_s`` before each, of a cubic spline through them.
+    """Return the derivative of samples (n, n_axes) by a cubic spline, ``lag_s`` before each sample.
 
-    At a fifth of the sample rate it is 2 % short, where a central difference lacks a quarter.
+    At a fifth of the sample rate it is 2 % too small; a central difference is 25 % too small.
     """
     at = time_s * np.arange(len(values))
     return np.asarray(make_interp_spline(at, values, k=3)(np.maximum(at - lag_s, 0.0), nu=1))
 
 
 def speeds_at_samples(position_rad: Array, time_s: float, step: int, lag_s: float = 0.0) -> Array:
-    """Return speeds (n, n_axes) [rad/s] at every ``step``-th of simulated positions ``time_s`` apart.
+    """Return speeds (n, n_axes) [rad/s] at every ``step``-th of simulated positions that are ``time_s`` apart.
 
-    From what is before each sample, where there is enough: there a target begins to hold, and accelerations
-    jump. ``lag_s``: how long before the sample the speed is that a simulator in steps tells; as much earlier
-    its targets begin to hold.
+    Each speed uses only positions before its sample if there are enough, because a new target begins there and the
+    acceleration jumps. ``lag_s``: time before the sample at which a stepped simulator reports its speed; its targets
+    begin as much earlier.
     """
     last = math.ceil(lag_s / time_s - _ROUNDING)
     if step < last + _POINTS - 1:
         return slope(position_rad, time_s, lag_s)[::step]
-    # Derivative of a cubic through the points, counted back from the sample, where the speed is meant.
+    # Derivative of a cubic through the points, counted back from the sample, at the time of the speed.
     back = -time_s * (last + np.arange(_POINTS))
     powers = np.arange(_POINTS)
     wanted = np.where(powers > 0, powers * (-lag_s) ** np.maximum(powers - 1, 0), 0.0)
@@ -111,7 +111,7 @@ def speeds_at_samples(position_rad: Array, time_s: float, step: int, lag_s: floa
     n = len(position_rad)
     at = np.arange(step, n, step)[:, None] - (last + np.arange(_POINTS))
     speed = np.einsum("k,nka->na", weights, position_rad[at])
-    # Logs are taken from rest, or from where a run-up has brought the simulator.
+    # Logs begin at rest, or where a run-up has brought the simulator.
     first = (position_rad[1:2] - position_rad[:1]) / time_s
     return np.concatenate([first, speed])
 

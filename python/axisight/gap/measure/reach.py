@@ -1,4 +1,4 @@
-"""The gap on the validation logs before, re-fitted and with the causes one after another."""
+"""Measures the gap on the validation logs as given, re-fitted, and with the causes added one after another."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 def refitted_errors(view: View, found: SearchState) -> list[ErrorLog]:
-    """Return the torque error of the re-fitted simulator on the estimation logs, and noise alone."""
+    """Return the torque error of the re-fitted simulator on the estimation logs, with noise alone."""
     with ThreadPoolExecutor(view.settings.threads) as pool:
         noise = pool.submit(view.noises, view.logs, 0)
         refit = view.torques(Variant(found.baseline.robot_values), view.logs)
@@ -35,10 +35,12 @@ def refitted_errors(view: View, found: SearchState) -> list[ErrorLog]:
 
 @dataclass(frozen=True)
 class Reach:
-    """The gap on the validation logs before, re-fitted and with the causes one after another.
+    """The gap on the validation logs as given, re-fitted and with the causes added one after another.
 
-    ``judged``: the same with the floor of a machine that chatters; ``change``: what all of it changes
-    of the simulator's torque there; ``simulator``: the one with all causes.
+    - ``judged``: the stages, with the floor of a chattering machine if it is one.
+    - ``reductions``: share of the explainable gap that each cause removes.
+    - ``left``: torque errors with all causes; ``change``: torque change from the simulator as given to all causes.
+    - ``simulator``: the simulator with all causes.
     """
 
     stages: Stages
@@ -57,12 +59,12 @@ def reach_of(
     causes: Sequence[Effect],
     settings: Settings,
 ) -> Reach:
-    """Measure the gap on validation logs; all ``causes`` are in ``after``."""
+    """Return the gap on validation logs with the ``causes`` added in their order; ``after`` has all of them."""
     values = found.model.robot_values
     variants = [Variant(values, tuple(causes[: i + 1])) for i in range(len(causes))]
     refit = Variant(found.baseline.robot_values)
     measured = [view.measured(log) for log in logs]
-    # Few logs are one simulation in lock-step: the simulators run beside one another.
+    # Few logs make one lock-step simulation, so the simulators run in parallel.
     simulators = (AS_GIVEN, refit, *variants)
     with ThreadPoolExecutor(settings.threads) as pool:
         noises = pool.submit(view.noises, logs, len(view.logs))
@@ -77,7 +79,7 @@ def reach_of(
     refitted, *stages = [measure(view.errors(torques, logs)) for torques in steps]
     floor = measure(noise)
     after = stages[-1] if stages else refitted
-    # The first cause is credited from the simulator as given: that is what the user had.
+    # The first cause is credited from the simulator as given, which is what the user had.
     earlier = [given, *stages]
     reductions = [
         gap_reduction(a, b, given, floor, draws=settings.bootstrap, seed=settings.seed)

@@ -1,4 +1,4 @@
-"""Measured and simulated torque of every log, before the causes and with them."""
+"""Measured and simulated torque of every log, as given and with the causes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SIGNALS = {
     "residual_before_torque_nm": "simulated_before less measured",
     "residual_after_torque_nm": "simulated_after less measured",
 }
-"""What there is of every log, and what it is."""
+"""Signals of every log, with their long names."""
 
 
 def signals_of(
@@ -26,8 +26,8 @@ def signals_of(
 ) -> tuple[xr.Dataset, ...]:
     """Return the signals of the estimation logs of a view, then those of ``held_out``.
 
-    ``after``: the simulator with the causes; ``logged``: whether torques were, and are not what the stated
-    controller commands. Of each log a Dataset as `Diagnosis.signals` describes.
+    One Dataset for each log, as described in `Diagnosis.signals`. ``after``: the simulator with the causes; ``logged``:
+    whether torques were logged, or are what the stated controller commands.
     """
     logs = [*view.logs, *held_out]
     roles = ["estimation"] * len(view.logs) + ["validation"] * len(held_out)
@@ -58,7 +58,7 @@ def signals_of(
 
 
 def _how(view: View, logged: bool) -> dict[str, str | float]:
-    """Return how simulator and logs were compared."""
+    """Return how simulator and logs were compared, as attributes of a Dataset."""
     out: dict[str, str | float] = {
         "mode": view.mode,
         "side": "motor",

@@ -1,4 +1,4 @@
-"""Where the gap lies: by axis, frequency band and regime, each against the floor."""
+"""Finds where the gap lies: by axis, frequency band and regime, each against the floor."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from axisight.logs import Log, lowpass
 
 Array = NDArray[np.float64]
 
-# Edges of the bands of the gap map [Hz]: rigid motion, its harmonics, the modes of arms, those of gears and drives.
+# Edges of the frequency bands of the gap [Hz]: rigid motion, its harmonics, modes of the arm, of gears and of drives.
 BAND_EDGES_HZ = (0.0, 0.5, 2.0, 6.0, 15.0, 40.0, 125.0)
-# Shares below this are not worth a line of their own.
+# Smallest share of the gap for which an axis is reported.
 _SMALLEST_SHARE = 0.1
 
 
@@ -32,13 +32,13 @@ class ErrorLog:
     noise: Array
 
 
-# An error in torque this much above the floor is seen by eye; noise of an unexpected
-# colour also lies above the floor in some band, but not in all of the torque.
+# Torque error, relative to the rms torque, from which it stands out above noise. Noise of an unexpected spectrum also
+# exceeds the floor in some band, but not in the whole torque.
 _SEEN = 0.02
 
 
 def stands_out(logs: Sequence[ErrorLog]) -> bool:
-    """Whether the plain torque error lies above the noise on some axis."""
+    """Whether the unweighted torque error exceeds the noise on some axis."""
     error = np.mean([relative_squares(x.log, x.error).mean(axis=0) for x in logs], axis=0)
     noise = np.mean([relative_squares(x.log, x.noise).mean(axis=0) for x in logs], axis=0)
     return bool(np.any(error > 1.05 * noise + _SEEN**2))
@@ -47,14 +47,13 @@ def stands_out(logs: Sequence[ErrorLog]) -> bool:
 def band_map(logs: Sequence[ErrorLog], block_s: float) -> xr.Dataset:
     """Return share, excess and significance by axis and frequency band.
 
-    Spectra are cosine transforms of blocks; a block's squared error in a band
-    beyond the mean of the noise is its excess, and the scatter over blocks
-    gives the significance.
+    Spectra are cosine transforms of blocks. The excess of a block is its squared error in a band minus the mean noise.
+    The scatter over blocks gives the significance.
     """
     rate = 1.0 / logs[0].log.sample_time_s
     edges = [e for e in BAND_EDGES_HZ if e < rate / 2] + [rate / 2]
     labels = [f"{a:g}-{b:g} Hz" for a, b in pairwise(edges)]
-    # Two seconds at least, so that the lowest band has lines of its own.
+    # At least two seconds, so that the lowest band has frequency lines.
     length = int(max(block_s, 2.0) * rate)
     cells = [_spectra(item, length, edges, rate) for item in logs]
     error = np.concatenate([c[0] for c in cells])
@@ -67,7 +66,7 @@ def band_map(logs: Sequence[ErrorLog], block_s: float) -> xr.Dataset:
 def _spectra(
     item: ErrorLog, length: int, edges: Sequence[float], rate: float
 ) -> tuple[Array, Array]:
-    """Return band powers (n_blocks, n_axes, n_bands), relative to the torque variance."""
+    """Return band powers (n_blocks, n_axes, n_bands) of error and noise, relative to the torque variance."""
     variance = np.maximum(np.var(item.log.torque_nm, axis=0), 1e-300)
     out = []
     for x in (item.error, item.noise):
@@ -85,7 +84,7 @@ def _spectra(
 def regime_maps(
     logs: Sequence[ErrorLog], bandwidth_hz: float, block_s: float
 ) -> dict[str, xr.Dataset]:
-    """Return one map per regime variable, by axis and bin."""
+    """Return one map for each regime variable, by axis and bin."""
     prepared = [_prepared(item, bandwidth_hz) for item in logs]
     maps = {}
     for name, labels in _REGIMES.items():
@@ -101,7 +100,7 @@ def regime_maps(
 
 
 AT_REVERSALS = ("direction: around reversals", "speed: slow", "speed: standstill")
-"""Regimes of what lies where the sign of speed changes."""
+"""Regimes around a change of sign of the speed."""
 
 _REGIMES: dict[str, list[str]] = {
     "speed": ["standstill", "slow", "medium", "fast"],
@@ -146,7 +145,7 @@ def _prepared(item: ErrorLog, bandwidth_hz: float) -> _Prepared:
 
 
 def _edges(name: str, prepared: Sequence[_Prepared]) -> Array:
-    """Return the inner edges of the bins per axis, (n_axes, n_edges)."""
+    """Return the inner edges of the bins by axis, (n_axes, n_edges)."""
     n_axes = prepared[0].squares.shape[1]
     if name == "speed":
         top = np.array([max(np.abs(p.speed[:, i]).max() for p in prepared) for i in range(n_axes)])
@@ -168,7 +167,7 @@ def _place(p: _Prepared, name: str, edges: Array, axis: int) -> NDArray[np.int64
 
 
 def _direction(p: _Prepared, axis: int) -> NDArray[np.int64]:
-    """Return 0 backward, 1 within 50 ms of a change of sign, 2 forward."""
+    """Return, for each sample (n,), 0 backward, 1 within 50 ms of a change of sign, 2 forward."""
     speed = p.speed[:, axis]
     sign = np.where(speed > 0, 2, 0)
     changes = np.flatnonzero(np.diff(sign) != 0)
@@ -181,7 +180,7 @@ def _direction(p: _Prepared, axis: int) -> NDArray[np.int64]:
 def _binned(
     p: _Prepared, name: str, edges: Array, n_bins: int, block_s: float
 ) -> tuple[Array, Array]:
-    """Return mean squares by block, axis and bin: sums in the bin over the block's length."""
+    """Return mean squares of error and noise (n_blocks, n_axes, n_bins): sums in the bin over the block's length."""
     n, n_axes = p.squares.shape
     count = max(1, int(n * p.sample_time_s / block_s))
     blocks = np.array_split(np.arange(n), count)
@@ -198,10 +197,10 @@ def _binned(
 
 
 def _summary(error: Array, noise: Array, labels: list[str], dim: str) -> xr.Dataset:
-    """Return share, excess and significance from cells (n_blocks, n_axes, n_bins)."""
+    """Return share, excess and significance from mean squares of error and noise (n_blocks, n_axes, n_bins)."""
     excess = error - noise.mean(axis=0)
     mean = excess.mean(axis=0)
-    # A single block has no scatter to be sure by.
+    # A single block has no scatter, so nothing is significant.
     standard_error = np.full_like(mean, np.inf)
     if len(excess) > 1:
         scatter = np.hypot(excess.std(axis=0, ddof=1), noise.std(axis=0, ddof=1))
@@ -225,11 +224,11 @@ def _summary(error: Array, noise: Array, labels: list[str], dim: str) -> xr.Data
 
 
 OF_GAP = "of the squared gap above the floor"
-"""What shares are of, in words."""
+"""The quantity of which shares are given, in words."""
 
 
 def of_axes(bands: xr.Dataset, axes: Collection[int]) -> xr.Dataset:
-    """Return the map of the bands with the gap of some ``axes`` (from 1) alone; that of others counts for nothing."""
+    """Return the map of the bands with only the gap of some ``axes`` (from 1); that of the others is zero."""
     among = np.isin(bands["axis"].values, list(axes))
     return bands.assign(square=bands["square"] * xr.DataArray(among.astype(float), dims="axis"))
 
@@ -239,9 +238,9 @@ def findings(
 ) -> tuple[Where, ...]:
     """Return the places that hold the gap, largest share first.
 
-    An axis counts when its excess is significant; its band is the smallest run
-    of significant bands that holds most of it, its regime the bin whose share
-    stands out most from an even spread of the error. ``of``: what shares are of, in words.
+    An axis counts if its excess is significant. Its band is the shortest run of significant bands that holds at least
+    70 % of it. Its regime is the bin whose share exceeds an even spread the most. ``of``: the quantity of which shares
+    are given, in words.
     """
     held = _held(bands, significance)
     total = held.sum()
@@ -253,7 +252,7 @@ def findings(
     return tuple(sorted(out, key=lambda w: -w.share))
 
 
-# By so much the weighted residual of an axis has to stand higher than that of the axis whose plain error does.
+# Ratio of weighted residuals from which an axis takes the lead over the axis with the largest plain error.
 _BY_FAR = 3.0
 # From where that is worth telling.
 _TOLD = 1.0
@@ -267,11 +266,11 @@ def led_by_weight(
     excess: Array,
     of: str = OF_GAP,
 ) -> tuple[Where, ...]:
-    """Return places led by the axis whose weighted residual stands highest above noise, where it does by far.
+    """Return the places led by the axis with the largest weighted residual above noise, if it is larger by far.
 
-    ``excess`` (n_axes,): mean square of it above the floor, in noise. ``of``: what shares are of, in words.
-    Slow drifts dominate plain errors of torque. They hide an error that is small beside the torque but far
-    above its noise.
+    Slow drifts dominate plain torque errors. They can hide an error that is small beside the torque but far above its
+    noise. ``excess`` (n_axes,): mean square of the weighted residual above the floor, in units of the noise; ``of``:
+    the quantity of which shares are given, in words.
     """
     i = int(np.argmax(excess))
     axis = int(bands["axis"].values[i])
@@ -280,7 +279,7 @@ def led_by_weight(
         return tuple(places)
     held = _held(bands, significance).sum(axis=1)
     if held[i] == 0:
-        # In no band steadily, but there.
+        # The error is there, but in no band steadily.
         held[i] = np.maximum(bands["square"].values[i], 0.0).sum()
     shares = held / max(held.sum(), 1e-300)
     others = [k for k in np.argsort(-shares) if k != i and shares[k] >= _SMALLEST_SHARE]
@@ -303,8 +302,7 @@ def placed(
 ) -> Where:
     """Return the place on axis ``i`` (from 0) of an error that holds ``share`` of the whole.
 
-    Without a significant band or regime these are None: the error is there, but in a few
-    stretches of time only.
+    Band and regime are None if none is significant: the error shows in a few stretches of time only.
     """
     axis = int(bands["axis"].values[i])
     regime, text = _main_regime(regimes, i, significance)
@@ -329,7 +327,7 @@ def _held(bands: xr.Dataset, significance: float) -> Array:
 
 
 def _main_band(held: Array) -> tuple[int, int]:
-    """Return the shortest run of bands with at least 70 % of the error."""
+    """Return the first and last band of the shortest run of bands with at least 70 % of the error."""
     n = len(held)
     for width in range(1, n + 1):
         sums = [held[k : k + width].sum() for k in range(n - width + 1)]
