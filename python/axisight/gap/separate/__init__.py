@@ -1,1 +1,1 @@
-"""The experiment that separates two causes which the logs at hand cannot tell apart."""
+"""Designs the experiment that separates two causes which the logs cannot tell apart."""

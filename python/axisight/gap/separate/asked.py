@@ -1,4 +1,4 @@
-"""What experiment is asked for with a diagnosis, and its design."""
+"""Adds the experiment that the user asks for to a diagnosis."""
 
 from __future__ import annotations
 
@@ -22,22 +22,25 @@ from axisight.robot import Robot
 
 @dataclass(frozen=True)
 class Asked:
-    """An experiment that is asked for: what separates the rivals that stay, or shows an effect.
+    """A request for an experiment: one that separates the remaining rivals, or one that shows an effect.
 
-    ``to_show``: the effect, of the size that is to show; ``within``: limits of motors in place of what
-    the logs show.
+    ``to_show``: the effect with the size that must show, None to separate rivals; ``within``: limits of the motors in
+    place of those seen in the logs.
     """
 
     to_show: Effect | None
     within: ExperimentLimits | None
 
     def check_limits(self, view: View) -> None:
-        """Raise InputError for limits that are no limits of these motors."""
+        """Raise InputError for limits that these motors cannot have."""
         if isinstance(view, ClosedLoopView):
             seen_range(view.logs, self.within)
 
     def added(self, out: Diagnosis, view: View, found: SearchState, *, keep: bool) -> Diagnosis:
-        """Return a diagnosis with the experiment, and what to do next; with ``keep``, after what is advised."""
+        """Return a diagnosis with the experiment as the next step.
+
+        With ``keep``, or with an effect to show, the step that the diagnosis already advises stays first.
+        """
         experiment = self._design(view, found)
         if experiment is None:
             return out
@@ -47,9 +50,9 @@ class Asked:
         return replace(out, experiment=made, next_experiment=advice)
 
     def _design(self, view: View, found: SearchState) -> Experiment | str | None:
-        """Return the experiment; None where nothing is open, and why there is none where one is to show something.
+        """Return the experiment, or the reason if none can show the effect; None if no rivals are left to separate.
 
-        By inverse dynamics there is no loop to simulate, and no experiment.
+        In inverse dynamics there is no loop to simulate, and so no experiment.
         """
         if not isinstance(view, ClosedLoopView):
             return self._no_experiment("by inverse dynamics there is no loop to run")
@@ -72,9 +75,9 @@ class Asked:
 def asked_of(
     robot: Robot, separate: bool, to_show: Effect | None, within: ExperimentLimits | None
 ) -> Asked | None:
-    """Return what is asked for; None if nothing is.
+    """Return the request for an experiment; None if there is none.
 
-    Raises InputError for an effect that the robot cannot have, or that does nothing, and for limits of nothing.
+    Raises InputError for an effect that the robot cannot have or that has zero size, and for limits without a request.
     """
     if within is not None and to_show is None and not separate:
         raise InputError(f"within: expected with separate or to_show only, got {within}")

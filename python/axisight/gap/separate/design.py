@@ -1,4 +1,4 @@
-"""Choose the motion that answers a question best, whatever the answer is."""
+"""Chooses the motion that answers a question best, whichever answer is true."""
 
 from __future__ import annotations
 
@@ -20,28 +20,31 @@ from axisight.simulation import simulate_batch
 
 Array = NDArray[np.float64]
 
-# Torque beyond what was seen by this share is too much.
+# Largest torque of a motion, relative to the largest one seen or allowed.
 _MARGIN = 1.05
-# Motions that are looked at again, one by one.
+# Motions that are evaluated again one by one, with exact weights.
 _FINALISTS = 6
-# How often a motion is run, at least and at most, and a standard one to compare with at most. A
-# diagnosis leaves each log out in turn: what one run alone tells, it does not believe.
+# Smallest and largest number of runs of a motion, and the largest number for the standard motion that is compared. At
+# least two, because a diagnosis leaves each log out in turn and does not believe a single run.
 _TWICE, _REPEATS, _FOR_EVER = 2, 10, 1000
 
 
 @dataclass(frozen=True, eq=False)
 class _Runs:
-    """A machine on every motion: motor angles and torques, (n, n_axes) each; whether it stands them."""
+    """Simulated runs of a machine along every motion, and whether its torque stays within the limits.
+
+    ``records``: motor angles and torques (n, n_axes) of each motion; ``possible`` (n_motions,).
+    """
 
     records: list[Record]
     possible: NDArray[np.bool_]
 
 
 def designed(view: ClosedLoopView, question: Question, limits: Range) -> Experiment:
-    """Return the motion within ``limits`` that answers a question best, run as often as it takes.
+    """Return the motion within ``limits`` that answers a question best, with the number of runs that it needs.
 
-    What may be so is simulated along each motion, and fitted by what else may be, in one linear step,
-    held by what the logs say of its parameters.
+    Each possible machine is simulated along each motion. The alternative model is fitted to that run in one linear
+    step, with what the logs already say about its parameters as a prior.
     """
     widest = 0.8 * min(view.settings.bandwidth_hz, 0.5 / view.robot.sample_time_s)
     time, seed = view.robot.sample_time_s, view.settings.seed
@@ -53,7 +56,7 @@ def designed(view: ClosedLoopView, question: Question, limits: Range) -> Experim
     worth = np.array([question.worth(rough[k]) for k in range(len(tried))])
     best_usual = int(np.argmax(worth[: len(usual)]))
     order = np.argsort(-worth, kind="stable")[:_FINALISTS]
-    # Weights as they will be with the new log decide between the best.
+    # Weights as they will be with the new log decide between the best motions.
     finalists = list(dict.fromkeys([best_usual, *order.tolist()]))
     exact = _seen(view, question.turns, runs, finalists, alone=True)
     best = max(finalists, key=lambda k: question.worth(exact[k]))
@@ -73,7 +76,7 @@ def designed(view: ClosedLoopView, question: Question, limits: Range) -> Experim
 
 
 def _repeats(question: Question, seen: Sequence[Seen], enough: float, most: int) -> int:
-    """Return how often a motion has to be run for enough, at most ``most`` times."""
+    """Return the number of runs of a motion that reaches a worth of ``enough``, at most ``most``."""
     tried = (r for r in range(_TWICE, most) if question.worth(seen, r) >= enough)
     return next(tried, most)
 
@@ -90,7 +93,7 @@ def _runs(
         threads=view.settings.threads,
     )
     angle, torque = out["position_rad"].values, out["torque_cmd_nm"].values
-    # One that broke off is NaN, and larger than anything.
+    # A run that diverged is NaN, and counts as infinite torque.
     size = np.nan_to_num(np.abs(torque), nan=np.inf).max(axis=1)
     records: list[Record] = [
         (np.ascontiguousarray(q), np.ascontiguousarray(u), np.ones_like(u), None, 0)
@@ -107,9 +110,9 @@ def _seen(
     *,
     alone: bool,
 ) -> dict[int, list[Seen]]:
-    """Return what is seen of each turn along each motion; nothing where it cannot be run.
+    """Return what each motion shows for each possible machine; zero for a motion that cannot be run.
 
-    ``alone``: each with the weights that its own torque brings.
+    ``alone``: evaluate each motion with the weights from its own torque.
     """
     n_axes = view.robot.n_axes
     nothing = Seen(np.zeros(n_axes), np.zeros(n_axes), 0.0)
@@ -132,11 +135,11 @@ def _seen(
 def _left(
     fitter: ClosedLoopFitter, model: FittedModel, free: Sequence[Hypothesis], n_axes: int
 ) -> tuple[Array, float]:
-    """Return what a model with the effects ``free`` leaves of each run, mean squares (n_runs, n_axes).
+    """Return the mean squares (n_runs, n_axes) that a model with the effects ``free`` leaves of each run.
 
     And the number of residuals of an axis.
     """
-    # Sensitivities of other logs are of no use here.
+    # Sensitivities along other logs cannot be reused.
     start = replace(model, columns={})
     values = model.robot_values
     found = must_hold(fitter.fit(free, start, robot_values=values, max_iterations=0))

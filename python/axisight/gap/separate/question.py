@@ -1,4 +1,4 @@
-"""What an experiment is to answer, and what a motion would tell about it."""
+"""The question that an experiment is to answer, and what a motion shows about it."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """One thing that may be so: ``machine`` is the machine, and ``other`` a model that is fitted to it.
+    """One possible truth: ``machine`` is the true model, and ``other`` is the model that is fitted to its run.
 
-    ``free``: effects of the other model that are fitted; ``neither``: those with which nothing is
-    explained that is asked about.
+    ``free``: fitted effects of the other model; ``neither``: those without the effects in question.
     """
 
     machine: FittedModel
@@ -31,9 +30,9 @@ class Turn:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What the other model leaves of a run and what there is to explain, mean squares (n_axes,) each.
+    """Mean squares (n_axes,) of one run: ``left`` by the other model, and ``there`` without the effects in question.
 
-    ``samples``: residuals of an axis.
+    ``samples``: number of residuals of an axis.
     """
 
     left: Array
@@ -42,22 +41,22 @@ class Seen:
 
 
 class Question(Protocol):
-    """What an experiment is to answer."""
+    """The question that an experiment is to answer."""
 
     @property
     def turns(self) -> Sequence[Turn]:
-        """What may be so, each to be told from its other model."""
+        """The possible truths, each with the model that must be told from it."""
 
     @property
     def axes(self) -> tuple[int, ...]:
-        """The axes (from 1) it is about; none if about the whole arm alone."""
+        """The axes (from 1) that the question is about; empty for the whole arm."""
 
     @property
     def enough(self) -> float:
-        """The worth that answers it."""
+        """The worth of a motion from which it answers the question."""
 
     def worth(self, seen: Sequence[Seen], repeats: int = 1) -> float:
-        """Return what a motion that is run so often is worth, from what is ``seen`` of each turn."""
+        """Return the worth of a motion with this many runs, from what it shows for each possible truth."""
 
     def answered(self, plan: Plan, worth: float) -> Experiment:
-        """Return a planned experiment with what it is worth."""
+        """Return the planned experiment with its worth."""

@@ -1,4 +1,4 @@
-"""Which two causes stay open, and the models that stand for them."""
+"""Selects the two causes that the logs cannot separate, and the models that contain them."""
 
 from __future__ import annotations
 
@@ -18,20 +18,22 @@ from axisight.gap.separate.question import Seen, Turn
 
 Array = NDArray[np.float64]
 
-# An alternative less likely than this is none.
+# Smallest probability of a rival.
 _LIKELY = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Rivals:
-    """Which of two fitted models is right, that explain the logs by different causes, the last effect of each.
+    """The question which of two fitted models is right; their last effects are the two rivals.
 
-    Each in turn is the machine: its simulated run along a motion is fitted by the other. What that leaves
-    is the log-likelihood ratio to expect once the run is among the logs, by the rules of a diagnosis. The
-    motion counts for the worse of the two, and for less where it hardly shows that there is a cause.
-    ``labels``: of these, ``effect@axis``. Of the logs, by axis: ``samples`` (n_axes,) and what there
-    was ``to_explain`` (n_axes,), as a mean square of the weighted residual above the noise.
-    ``least``: of that, below which nothing is a cause.
+    Each model in turn is the machine, and its simulated run along a motion is fitted by the other. The error that this
+    leaves gives the log-likelihood ratio that a diagnosis with that run would find. A motion counts by the less
+    favourable of the two. It counts for less if it hardly shows that there is a cause at all.
+
+    - ``labels``: the rivals, as ``effect@axis``.
+    - ``samples`` (n_axes,): number of residuals in the logs.
+    - ``to_explain`` (n_axes,): mean square of the weighted residual above the noise in the logs.
+    - ``least``: smallest mean square of a cause.
     """
 
     labels: tuple[str, str]
@@ -42,13 +44,13 @@ class Rivals:
 
     @property
     def axes(self) -> tuple[int, ...]:
-        """The axes (from 1) they act on; none for effects of the whole arm alone."""
+        """The axes (from 1) that the rivals act on; empty for effects of the whole arm."""
         found = {m.free[-1].effect.axis for m in self.models}
         return tuple(sorted(a for a in found if a is not None))
 
     @property
     def turns(self) -> tuple[Turn, Turn]:
-        """Each of them as the machine; without its last effect, the other explains nothing."""
+        """Each of the two as the machine; without its last effect, the other explains nothing of the question."""
         one, other = self.models
         return _turn(one, other), _turn(other, one)
 
@@ -58,7 +60,7 @@ class Rivals:
         return ENOUGH
 
     def worth(self, seen: Sequence[Seen], repeats: int = 1) -> float:
-        """Return the log-likelihood ratio to expect, on the axis that shows most, of the worse rival."""
+        """Return the expected log-likelihood ratio on the axis that shows most, for the less favourable rival."""
         ratios = []
         for one in seen:
             new = np.full_like(self.samples, repeats * one.samples)
@@ -66,7 +68,8 @@ class Rivals:
             explained = np.stack([self.to_explain, one.there], -1)
             left = np.stack([np.zeros_like(one.left), one.left], -1)
             ratio = log_ratio(left, explained, samples)
-            # Beside the new runs the old ones weigh otherwise: what they show now may not show then.
+            # New runs reduce the weight of the old logs. A cause that shows in these may show no more in all logs
+            # together.
             shown = one.there * new / samples.sum(-1)
             ratios.append(float((ratio * np.minimum(1.0, shown / (NAMED * self.least))).max()))
         return min(ratios)
@@ -81,9 +84,9 @@ def _turn(machine: FittedModel, other: FittedModel) -> Turn:
 
 
 def rivals_of(found: SearchState, settings: Settings) -> Rivals | None:
-    """Return the two causes of a search that are most nearly as likely; None where all is clear.
+    """Return the cause and the rival with the most similar probabilities; None if no cause has a rival.
 
-    Of every cause, the likeliest rival that is no cause itself, at least one in twenty.
+    A rival is no cause itself and has a probability of at least 5 %.
     """
     accepted = {r.trial.label for r, _ in found.accepted}
     open_pairs = [
@@ -109,7 +112,7 @@ def rivals_of(found: SearchState, settings: Settings) -> Rivals | None:
 def _beside_as_many(
     found: SearchState, first: FittedHypothesis, other: FittedHypothesis
 ) -> FittedHypothesis:
-    """Return a cause as it was fitted beside the same others as its rival, which may not have been fitted since."""
+    """Return the fit of a cause beside the same other causes as its rival, which may be older than the latest fit."""
     for one in found.rounds:
         for r, _ in one.accepted:
             if r.trial.label == first.label and _others(r.trial) == _others(other):

@@ -1,4 +1,4 @@
-"""Whether a machine has an effect of a size that its logs would not show."""
+"""The question whether a machine has an effect of a size that its logs would not show."""
 
 from __future__ import annotations
 
@@ -20,18 +20,21 @@ from axisight.gap.views.view import View
 
 Array = NDArray[np.float64]
 
-# What one linear step of a plainer law leaves of what a fit of it would take away.
+# Share of the loss that one linear step of a simpler law may leave, although a full fit would remove it.
 _ONE_STEP = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Sought:
-    """Whether an effect is there, of a size that would not show: ``asked``, and in full the ``effect``.
+    """The question whether an effect of a given size is there, although the logs at hand do not show it.
 
-    The machine has it, and its simulated run along a motion is fitted without it. What that leaves has to
-    be what detection limits ask for, of all logs together; what the old ones would show of it does not
-    count. ``without``: the fitted model, all causes in; ``plainer``: numbers of the effect that a plainer
-    law has, which make up for what they can; ``cost``: fitted numbers of the effect.
+    The machine has the effect, and its simulated run along a motion is fitted without it. The loss that this leaves
+    must reach the detection limit of all logs together. What the old logs would show of the effect does not count.
+
+    - ``asked``: the effect as asked for; ``effect``: the same with all parameters.
+    - ``without``: the fitted model with all causes.
+    - ``plainer``: the part of the effect that a simpler law has, which may compensate for it.
+    - ``cost``: number of fitted parameters of the effect.
     """
 
     asked: Effect
@@ -44,25 +47,25 @@ class Sought:
 
     @property
     def turns(self) -> tuple[Turn]:
-        """The machine with the effect, and what was found so far fitted to it."""
+        """The machine with the effect, and the model found so far that is fitted to it."""
         machine = replace(self.without, effects=(*self.without.effects, self.effect))
         free = (*self.without.free, *self.plainer)
         return (Turn(machine, self.without, free, self.without.free),)
 
     @property
     def axes(self) -> tuple[int, ...]:
-        """The axes (from 1) it acts on; none if on the whole arm."""
+        """The axes (from 1) that the effect acts on; empty for the whole arm."""
         if self.effect.axes is not None:
             return self.effect.axes
         return () if self.effect.axis is None else (self.effect.axis,)
 
     @property
     def enough(self) -> float:
-        """The size, relative to the smallest that would show, at which it is named, too."""
+        """The worth from which the effect is also named: a multiple of the smallest size that shows."""
         return NAMED
 
     def worth(self, seen: Sequence[Seen], repeats: int = 1) -> float:
-        """Return the size relative to the smallest that would show, on the axis that shows most."""
+        """Return the size of the effect relative to the smallest that would show, on the axis that shows most."""
         (one,) = seen
         new = repeats * one.samples
         more = 1.0 + new / self.found.layout.samples()
@@ -71,14 +74,14 @@ class Sought:
         return float(np.sqrt(np.max(new * left / shows)))
 
     def answered(self, plan: Plan, worth: float) -> ShowingExperiment:
-        """Return a planned experiment with what it shows."""
+        """Return a planned experiment with its worth."""
         return ShowingExperiment(plan, self.asked, worth)
 
 
 def sought(found: SearchState, view: View, effect: Effect) -> Sought | str:
-    """Return the question whether a machine has an effect; why there is none, in words, otherwise.
+    """Return the question whether a machine has an effect, or the reason in words why it cannot be asked.
 
-    What shapes the effect and is not given is as it is in a candidate of a diagnosis.
+    Shape parameters that are not given are those of a candidate of the diagnosis.
     """
     if effect.label in {e.label for e in found.model.effects}:
         return "these logs show one already"
@@ -100,7 +103,7 @@ def sought(found: SearchState, view: View, effect: Effect) -> Sought | str:
 
 
 def _numbers(name: str) -> tuple[set[str], set[str]]:
-    """Return the amplitudes of an effect, and those of them that a plainer law has."""
+    """Return the amplitudes of an effect, and those of them that a simpler law has."""
     info = effect_info(name)
     amplitudes = {p.name for p in info.parameters if p.role == "amplitude"}
     return amplitudes, amplitudes & {

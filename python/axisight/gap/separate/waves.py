@@ -1,6 +1,6 @@
-"""Motions that an experiment may be: velocity references from rest to rest, of one axis or all.
+"""Motions for an experiment: velocity references from rest to rest, of one axis or all.
 
-None goes beyond what the logs show the machine to do: speeds, travel, torques.
+No motion exceeds the speed, travel or torque that the logs show, unless the user gives other limits.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ Array = NDArray[np.float64]
 
 # Length of an experiment [s]: some periods of the slowest motion, and short enough to repeat.
 SECONDS = 8.0
-# Of a standard multisine, and of one as wide as residuals are looked at.
+# Band of the standard multisine [Hz], and the share of the Nyquist frequency that limits it.
 _BAND_HZ = (1.0, 40.0)
 _SHARE_OF_NYQUIST = 0.8
-# Shares of the largest speed that a motion is tried at.
+# Speeds at which a motion is tried, as shares of the largest.
 _LEVELS = (1.0, 0.6, 0.3, 0.1)
-# Of the ends, over which a motion fades in and out.
+# Time over which a motion fades in and out [s].
 _FADE_S = 0.1
 
 
@@ -40,10 +40,10 @@ class Motion:
 
 @dataclass(frozen=True)
 class ExperimentLimits:
-    """What motors may do in an experiment, in place of what the logs show; None for that.
+    """Limits of the motors in an experiment, in place of the ranges seen in the logs; None keeps the seen range.
 
-    Largest absolute values, one number for all axes or one each: ``velocity_rad_s`` of the reference,
-    ``travel_rad`` from where an experiment begins, ``torque_nm``; motor side.
+    Largest absolute values on the motor side, one number for all axes or one for each: ``velocity_rad_s`` of the
+    reference, ``travel_rad`` from the start of the experiment, ``torque_nm``.
     """
 
     velocity_rad_s: ArrayLike | None = None
@@ -53,7 +53,7 @@ class ExperimentLimits:
 
 @dataclass(frozen=True)
 class Range:
-    """What motors may do: ``speed`` [rad/s], travel ``back`` and ``forth`` [rad], ``torque`` [Nm], (n_axes,) each."""
+    """Range of the motors: ``speed`` [rad/s], travel ``back`` and ``forth`` [rad], ``torque`` [Nm], (n_axes,) each."""
 
     speed: Array
     back: Array
@@ -62,10 +62,9 @@ class Range:
 
 
 def seen_range(logs: Sequence[Log], limits: ExperimentLimits | None = None) -> Range:
-    """Return what the motors do in logs, from where each begins.
+    """Return the range of the motors in logs, from where each log begins, with ``limits`` in place of what was seen.
 
-    Or may do: ``limits`` take the place of what was seen. Raises InputError for limits that are not
-    positive, or not one for each axis or for all.
+    Raises InputError for limits that are not positive, or whose number is neither one nor that of the axes.
     """
     speeds, turned = [], []
     for log in logs:
@@ -82,7 +81,7 @@ def seen_range(logs: Sequence[Log], limits: ExperimentLimits | None = None) -> R
 
 
 def _stated(seen: Range, limits: ExperimentLimits) -> Range:
-    """Return what was seen with the limits that are stated in place of it."""
+    """Return the seen range with the stated limits in its place."""
     given: dict[str, Array] = {}
     for name, value in vars(limits).items():
         if value is not None:
@@ -100,9 +99,9 @@ def _stated(seen: Range, limits: ExperimentLimits) -> Range:
 
 
 def standard(seen: Range, sample_time_s: float, seed: int) -> list[Motion]:
-    """Return the multisine on a square wave, on all axes, as an identification would take it.
+    """Return the standard identification motion at several levels: a multisine on a square wave, on all axes.
 
-    At several levels: the loudest takes too much torque of some machines.
+    Lower levels are tried because the largest needs too much torque on some machines.
     """
     n_axes = len(seen.speed)
     waves = [_shapes(sample_time_s, seed + 1 + i, 0.0)["a multisine"] for i in range(n_axes)]
@@ -114,7 +113,7 @@ def standard(seen: Range, sample_time_s: float, seed: int) -> list[Motion]:
 def motions(
     seen: Range, axes: Sequence[int], sample_time_s: float, widest_hz: float, seed: int
 ) -> Iterator[Motion]:
-    """Yield the motions to try: every shape at every level, on each of ``axes`` (from 1) alone and on all."""
+    """Yield the motions to try: every shape at every level, on each of ``axes`` (from 1) alone and on all axes."""
     n_axes = len(seen.speed)
     every = tuple(range(1, n_axes + 1))
     moved = [(a,) for a in axes] + ([every] if n_axes > 1 else [])
@@ -135,7 +134,7 @@ def motions(
 
 
 def _shapes(sample_time_s: float, seed: int, widest_hz: float) -> Mapping[str, Array]:
-    """Return shapes of unit peak without a mean, (n,) each, by what they are."""
+    """Return shapes (n,) of unit peak and zero mean, by their description."""
     n = round(SECONDS / sample_time_s)
     n -= n % 8
     time = np.arange(n) * sample_time_s
@@ -155,8 +154,8 @@ def _shapes(sample_time_s: float, seed: int, widest_hz: float) -> Mapping[str, A
     steps = np.repeat([1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0, 0.0], n // 8)
     louder = np.repeat([0.1, 0.1, 0.3, 0.3, 0.3, 1.0, 1.0, 1.0], n // 8) * out["a multisine"]
     out |= {
-        # These ride on a square wave, too: what dry friction makes of a motor that trembles at rest is
-        # open, and counts for little.
+        # Multisines ride on a square wave. How dry friction acts on a motor that trembles around rest is uncertain, so
+        # such data have little weight.
         "a wide multisine": _unit(_unit(wide) + flat),
         "a multisine of high frequencies": _unit(_unit(high) + flat),
         "a multisine that grows": _unit(louder),
@@ -167,12 +166,12 @@ def _shapes(sample_time_s: float, seed: int, widest_hz: float) -> Mapping[str, A
     }
     fade = np.minimum(1.0, np.minimum(time, period - time) / _FADE_S)
     faded = {words: fade * wave for words, wave in out.items()}
-    # Back to where it began.
+    # Subtract the mean, so that each motion ends where it began.
     return {words: _unit(wave - fade * wave.sum() / fade.sum()) for words, wave in faded.items()}
 
 
 def _smooth(steps: Array, sample_time_s: float) -> Array:
-    """Return steps rounded over a twentieth of a second."""
+    """Return steps rounded over 0.05 s."""
     width = round(0.05 / sample_time_s)
     return np.convolve(steps, np.ones(width) / width, mode="same")
 
@@ -182,7 +181,7 @@ def _unit(wave: Array) -> Array:
 
 
 def _within(shape: Array, seen: Range, sample_time_s: float) -> Array:
-    """Return a shape (n, n_axes) at the largest size, of either sign, within speed and travel."""
+    """Return a shape (n, n_axes), scaled to the largest size of either sign within speed and travel."""
     turned = np.cumsum(shape, axis=0) * sample_time_s
     sizes = []
     for sign in (1.0, -1.0):
