@@ -1,7 +1,7 @@
-"""A machine whose clock is not that of its references, as logs show by themselves.
+"""A machine whose clock runs at another rate than that of its references, found from logs without a fit.
 
-The command follows from references and measured positions by the stated controller, once the references
-are taken from where the machine's clock had them: a little later, the longer the log runs.
+With one clock, the stated controller gives the logged torque from references and measured positions. With two,
+it does so only if the references are taken at the times of the machine's clock. The shift grows along the log.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from axisight.logs import Log
 Array = NDArray[np.float64]
 
 Missed = Callable[[Log, int], float]
-"""Squares of what the stated controller misses of the torque of a log on an axis (from 0)."""
+"""Return the sum of squares of the torque of a log on an axis (from 0) that the stated controller does not give."""
 
-# Two runs of a clock are told apart by references that are so far apart at the end of a log [s].
+# Shift of the references at the end of a log [s] that tells two rates of a clock apart.
 _APART_S = 1e-3
-# Share of what the stated controller misses that another clock may leave, in every log.
+# Share of the stated controller's squared error that a log may keep with the drifting clock.
 _LEFT = 0.02
-# An interval is at least so wide: what a reference is between its samples nobody knows.
+# Half-width of the interval of the rate, relative. Logs do not contain the references between samples.
 _OF_THE_RATE = 0.01
 
 
 def with_drift(log: Log, rate: float) -> Log:
-    """Return a log with the references that a clock meets which is fast by ``rate`` [1]."""
+    """Return a log whose references are taken at the times of a clock that is fast by the relative ``rate`` [1]."""
     reference = log.velocity_ref_rad_s
     assert reference is not None  # closed loop only
     at = np.arange(log.n_samples)
@@ -44,10 +44,11 @@ def with_drift(log: Log, rate: float) -> Log:
 def drifting_clock(
     logs: Sequence[Log], stated: Array, shows: Array, missed: Missed
 ) -> AlgebraicCause | None:
-    """Return the drift of the machine's clock, if that is what its controller misses.
+    """Return the drift of the machine's clock as a cause; None if it does not explain what the controller misses.
 
-    ``stated``: squares (n_axes, n_logs) that the controller of the robot file misses of the torque;
-    ``shows``: where that is anything. The drift has to give nearly all of it, on every axis of every log.
+    ``stated`` (n_axes, n_logs): squared error of the torque that the controller of the robot file gives.
+    ``shows``, same shape: whether that error is above the noise. The drift has to explain 98 % of it on each of
+    these axes and logs.
     """
     places = np.argwhere(shows)
     axis, log = max(places.tolist(), key=lambda at: float(stated[at[0], at[1]]))
@@ -80,7 +81,7 @@ def drifting_clock(
 
 
 def _nearest(log: Log, missed: Callable[[Log], float]) -> float:
-    """Return the drift on a grid that misses least of one log."""
+    """Return the drift on a grid that gives one log the smallest squared error."""
     (info,) = effect_info(CLOCK[0]).parameters
     count = int((info.upper - info.lower) * _duration(log) / _APART_S) | 1
     rates = np.linspace(info.lower, info.upper, count)

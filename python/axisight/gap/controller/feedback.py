@@ -16,20 +16,20 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
 
-# Flat tops of at least so many samples are a limit.
+# Number of equal extreme samples in a row that count as a torque limit.
 _FLAT_SAMPLES = 3
 
 
 def before(x: Array) -> Array:
-    """Return the sum over all earlier samples (n, ...)."""
+    """Return the sum over all earlier samples, without the present one (n, ...)."""
     return np.asarray(np.cumsum(x, axis=0) - x)
 
 
 def as_taken(log: Log) -> tuple[Array, Array]:
-    """Return positions of motors [rad] and their speeds [rad/s] as a controller takes them, (n, n_axes) each.
+    """Return motor positions [rad] and speeds [rad/s] as the controller computes them, (n, n_axes) each.
 
-    Positions are counted from where its summed reference is at the first sample. Of a log that begins at
-    rest that is the first position, and the first speed is none.
+    Position zero is the controller's summed reference at the first sample. Without a run-up that is the first
+    position, and the first speed is zero. Speeds are differences of neighbouring positions.
     """
     position = log.position_rad - log.position_rad[0]
     ahead, last = 0.0, position[:1]
@@ -42,10 +42,10 @@ def as_taken(log: Log) -> tuple[Array, Array]:
 
 
 def told_of(robot: Robot, log: Log, axis: int) -> tuple[Array, Array, Array]:
-    """Return what a controller is told of an axis from 0: speed, angle, and the rate of its reference, (n,) each.
+    """Return the references of an axis (from 0): speed, angle and rate of the reference, (n,) each, in rad and s.
 
-    Speeds are zero where targets of positions come without any, or their rates are not taken; angles count from
-    the first. Raises InputError for a log without references.
+    Angles count from the first sample. The speed is zero where the controller has position targets without
+    speed references, or does not use these. Raises InputError for a log without references.
     """
     rates, targets, time = log.velocity_ref_rad_s, log.position_ref_rad, log.sample_time_s
     if rates is None and targets is None:
@@ -53,7 +53,7 @@ def told_of(robot: Robot, log: Log, axis: int) -> tuple[Array, Array, Array]:
     if rates is not None and (targets is None or not robot.told_positions):
         speed = rates[:, axis]
         return speed, before(speed) * time, speed
-    assert targets is not None  # one of both is there
+    assert targets is not None  # the first check leaves one of both
     target = targets[:, axis] - targets[0, axis]
     moved = np.diff(target, prepend=target[:1]) / time
     fed = robot.velocity_feedforward and rates is not None
@@ -61,9 +61,9 @@ def told_of(robot: Robot, log: Log, axis: int) -> tuple[Array, Array, Array]:
 
 
 def feedback(robot: Robot, speed: Array, angle: Array, axis: int | None = None) -> Array:
-    """Return the torque for errors of speed [rad/s] and angle [rad], (n, n_axes), or (n,) of ``axis`` from 0.
+    """Return the torque [Nm] for errors of speed [rad/s] and angle [rad], (n, n_axes), or (n,) of ``axis`` from 0.
 
-    Before any limit. Linear: shares of references and of positions may be given apart.
+    Before any limit. The law is linear: the parts of references and of positions may be computed apart.
     """
     proportional, integral = gain_shares(robot, speed, angle, axis)
     return np.asarray(proportional + integral)
@@ -72,10 +72,10 @@ def feedback(robot: Robot, speed: Array, angle: Array, axis: int | None = None) 
 def gain_shares(
     robot: Robot, speed: Array, angle: Array, axis: int | None = None
 ) -> tuple[Array, Array]:
-    """Return what the proportional and the integral gain make of the errors, as in `feedback`.
+    """Return the torques of the proportional and of the integral gain for the errors, as in `feedback`.
 
-    Of a controller that is told positions those are the gains of position and of speed; of a computed torque
-    at the operating point, other axes apart where one is asked for.
+    A controller of positions has the gains of position and of speed instead. A computed torque takes the
+    inertia at the operating point; with ``axis``, without its coupling to other axes.
     """
     gains = {k: v if axis is None else v[axis] for k, v in robot.controller_gains.items()}
     kp, ki = gains["kp"], gains.get("ki", 0.0)
@@ -94,16 +94,16 @@ def gain_shares(
 
 
 def told_as_torque(robot: Robot, speed: Array, angle: Array) -> Array:
-    """Return the torque (n, n_axes) [Nm] that errors of positions are told as: what the gains make of them.
+    """Return position errors as the torque (n, n_axes) [Nm] that the gains make of them.
 
-    Of a cascade without its integral, in which noise adds up to a drift.
+    For a cascade without its integral, which would sum noise to a drift.
     """
     proportional, other = gain_shares(robot, speed, angle)
     return proportional if "kv" in robot.controller_gains else np.asarray(proportional + other)
 
 
 def told_gain(robot: Robot, frequency_hz: Array) -> Array:
-    """Return the same over frequency, by each motor for its own error (n_axes, n_freq) [Nm/rad]."""
+    """Return the gain of `told_as_torque` over frequency, of each motor on its own (n_axes, n_freq) [Nm/rad]."""
     gains, time = robot.controller_gains, robot.sample_time_s
     if "kv" in gains:
         rate = (1 - np.exp(-2j * np.pi * frequency_hz * time)) / time
@@ -113,7 +113,7 @@ def told_gain(robot: Robot, frequency_hz: Array) -> Array:
 
 
 def inertia_of_motors(robot: Robot) -> Array:
-    """Return what motors feel of a rigid robot at its operating point (n_axes, n_axes) [kg m^2], symmetric."""
+    """Return the inertia at the motors of a rigid robot at its operating point (n_axes, n_axes) [kg m^2]."""
     at = np.zeros(robot.n_joints)
     at[robot.axis_joints] = robot.operating_point
     driven = np.ix_(robot.axis_joints, robot.axis_joints)
@@ -137,7 +137,7 @@ def controller_response(robot: Robot, frequency_hz: Array) -> Complex:
         out = gains["kd"] * out + kp
         moved = inertia_of_motors(robot) if robot.computed_torque else np.eye(robot.n_axes)
         return np.asarray(moved * out[:, None, :])
-    # The error of a cascade is summed up to the sample before.
+    # A cascade sums its error up to the previous sample.
     cascade = "kv" in gains
     summed = ki * time * back / (1 - back)
     out = (out + gains["kv"]) * (kp + summed) if cascade else kp * out + ki
@@ -145,10 +145,10 @@ def controller_response(robot: Robot, frequency_hz: Array) -> Complex:
 
 
 def loop_responses(robot: Robot, frequency_hz: Array) -> tuple[Complex, Complex]:
-    """Return how the controller answers errors of sensors and torques on the motors.
+    """Return how the torque of the loop responds to errors of the sensors and to torques on the motors.
 
-    ``F (I + G F)^-1`` [Nm/rad] and ``F (I + G F)^-1 G`` [1], each (n_freq, n_axes, n_axes). Zero
-    frequency, where machine and controller are infinite, is taken as the first above it.
+    With controller ``F`` and machine ``G``: ``F (I + G F)^-1`` [Nm/rad] and ``F (I + G F)^-1 G`` [1], each
+    (n_freq, n_axes, n_axes). At zero frequency, where both are infinite, the lowest positive frequency is used.
     """
     f = np.maximum(frequency_hz, frequency_hz[frequency_hz > 0].min())
     machine = robot.zoh_response(f).values
@@ -159,11 +159,11 @@ def loop_responses(robot: Robot, frequency_hz: Array) -> tuple[Complex, Complex]
 def periodic_response(
     robot: Robot, effect: str, axis: int, loops: tuple[Complex, Complex], frequency_hz: Array
 ) -> Complex:
-    """Return how an effect that repeats with the motor angle shows in the torque of its axis (n_freq,).
+    """Return the response of an axis' torque (n_freq,) to an effect that is periodic in the motor angle.
 
-    From an error of the sensor [rad], a torque on the motor, or an error of the gear [rad, joint side];
-    ``loops``: as `loop_responses` gives them; ``axis`` from 0. An error of the gear acts as a turn of all
-    motors would that they do not make themselves: by the torque that they take, but for that of the rotors.
+    The input is an error of the sensor [rad], a torque on the motor [Nm] or an error of the gear [rad, joint
+    side]. ``axis`` from 0; ``loops``: from `loop_responses`. A gear error acts as a turn of the motor that the
+    sensor does not see, and for which the rotor's inertia and friction take no torque.
     """
     from_angle, from_torque = loops
     acts = effect_info(effect).acts
@@ -175,14 +175,15 @@ def periodic_response(
     s = 2j * np.pi * frequency_hz
     rotor = values[f"{robot.axis_names[axis]}.motor_inertia"] * s**2
     friction = values[f"{robot.axis_names[axis]}.viscous_friction"] * s
-    # Held commands come half a sample late, these torques do not: near the resonance both terms cancel.
+    # Commands are held, half a sample late on average; these torques are not. Near the resonance both terms
+    # cancel, so that half a sample matters.
     at_once = from_torque[:, axis, axis] * np.exp(0.5 * s * robot.sample_time_s)
     gear = (rotor + friction) * at_once - from_angle[:, axis, axis]
     return np.asarray(gear / robot.gear_ratio[axis])
 
 
 def free_of_limits(torque: Array, width: int) -> Mask:
-    """Return which samples (n,) lie farther than ``width`` from where the torque is cut at its extremes."""
+    """Mark the samples (n,) that are more than ``width`` samples away from a flat top of the torque."""
     free = np.ones(len(torque), dtype=bool)
     for extreme in (torque.min(), torque.max()):
         for a, b in runs(torque == extreme):

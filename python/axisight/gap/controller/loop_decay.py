@@ -1,4 +1,4 @@
-"""How fast a loop forgets where it began: the slowest mode of a robot and its sampled controller."""
+"""How fast a loop forgets its initial state: the slowest mode of a robot with its sampled controller."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 
 FORGOTTEN = 0.01
-"""Share of what differs at the beginning that may be left where a comparison begins.
+"""Share of a difference in the initial state that may be left where a comparison begins.
 
-That of the errors of formulas in the torque (`Settings.model_error`).
+Equal to the formula error of a torque (`Settings.model_error`, 1 %).
 """
-# Of the loop, in which a state is left within a sample.
+# Smallest size of an eigenvalue, to keep its logarithm finite. Such a mode ends within one sample.
 _AT_ONCE = 1e-12
 
 
 def slowest_decay_1_s(robot: Robot, joint_angle_rad: Array) -> float:
-    """Return the rate [1/s] with which the slowest mode of the loop decays, at rest at a pose (n_axes,) [rad].
+    """Return the decay rate [1/s] of the slowest mode of the loop, at rest at the pose (n_axes,) [rad].
 
-    Not above zero where the loop does not settle. Linear, without delays and limits. The plant is
-    propagated exactly from sample to sample (zero-order hold; Astrom and Wittenmark, *Computer-Controlled
-    Systems*, 1997, ch. 2); a law of targets, which may hold between samples, is taken as continuous.
+    Zero or negative if the loop does not settle. Linear, without delays and limits. The plant is propagated
+    exactly from sample to sample (zero-order hold; Astrom and Wittenmark, *Computer-Controlled Systems*, 1997,
+    ch. 2). A controller of positions may act between samples, and is taken as continuous.
     """
     plant = robot.linearize(joint_angle_rad.tolist())
     gains = robot.controller_gains
@@ -36,7 +36,7 @@ def slowest_decay_1_s(robot: Robot, joint_angle_rad: Array) -> float:
 
 
 def _continuous(robot: Robot, states: Array, inputs: Array, outputs: Array) -> Array:
-    """Return the rates of a plant whose motors are told their torque by position and speed."""
+    """Return the state matrix of the plant under a continuous controller of positions and speeds."""
     gains = robot.controller_gains
     command = np.diag(gains["kp"]) @ outputs + np.diag(gains["kd"]) @ outputs @ states
     if robot.computed_torque:
@@ -45,7 +45,7 @@ def _continuous(robot: Robot, states: Array, inputs: Array, outputs: Array) -> A
 
 
 def _sampled(robot: Robot, states: Array, inputs: Array, outputs: Array) -> Array:
-    """Return the transition of plant, last measured angles and sums of the controller over a sample."""
+    """Return the transition over one sample of the plant, the last measured angles and the controller's sums."""
     n, m = inputs.shape
     time = robot.sample_time_s
     both = np.block([[states, inputs], [np.zeros((m, n + m))]])
@@ -58,7 +58,7 @@ def _sampled(robot: Robot, states: Array, inputs: Array, outputs: Array) -> Arra
     kp, ki = gains["kp"], gains.get("ki", none)
     if "kv" in gains:
         error = speed + gains["kv"] @ angle
-        # What is summed up for nothing is never forgotten, nor does it matter.
+        # Without an integral gain the sum has no effect, and a mode that never decays; it is set to zero.
         command, summed = kp @ error + ki @ sums, (ki > 0) @ (sums + time * error)
     else:
         command, summed = kp @ speed + ki @ angle, none @ angle

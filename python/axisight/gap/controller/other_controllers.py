@@ -1,8 +1,8 @@
-"""What logs say of the controller by themselves: gains and filters that are not the stated ones.
+"""Finds gains and filters of the controller that differ from the robot file, from logs without a fit.
 
-A command is algebra of references and measured positions, whatever the machine. Where that of the
-robot file misses the logged torque and that of another controller does not, the machine has the
-other one. The simulator that is kept on a log does not see it: its feedback is its own.
+The controller's law gives the torque from references and measured positions, whatever the machine does. If the
+stated law misses the logged torque and another law gives it, the machine has the other controller. A fit cannot
+see this where a feedback of its own keeps the simulator on the log.
 """
 
 from __future__ import annotations
@@ -28,30 +28,32 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Compared up to here, or a fifth of the Nyquist frequency: above, drives filter what they report.
+# Upper end of the compared band [Hz], and as a share of the Nyquist frequency; the lower one counts. Drives
+# filter the torques that they report above.
 _BAND_HZ = 100.0
 _SHARE_OF_NYQUIST = 0.2
-# Of the torque's variance: less than this off the command is no other controller.
+# Smallest error of the stated law, as a share of the torque's variance, that can show another controller.
 _NOTHING = 1e-4
-# Share of what the stated controller misses that another one may leave, in every log.
+# Share of the stated law's squared error that another law may leave, in every log.
 _LEFT = 0.02
-# Periods of the band's edge, over which the low-pass remembers where a log begins.
+# Start of a log that is left out, in periods of the band's upper end: its low-pass depends on what was before
+# the log.
 _BEGUN = 5
-# Lags of a filter that are looked for [s], and how many before the search is refined.
+# Range of the lags of a filter that are searched [s], and number of grid points before the refinement.
 _LAGS_S = (1e-4, 0.05)
 _STEPS = 12
-# Damping of the filters that are tried: of the first order, Butterworth's, and two of the first in a row. What the
-# simulator has is of the first order; slow motion is told the lag alone.
+# Damping ratios of the filters that are tried: first order (0), Butterworth, and two first-order filters in a
+# row. The simulator's filter has the first order: slow motion shows the lag only.
 _FILTERS = (0.0, float(np.sqrt(0.5)), 1.0)
-# A gain this near the stated one is that; intervals are at least half as wide: filters are written
-# in several ways, of which a lag knows less.
+# A gain counts as the stated one up to this relative difference. Intervals have at least the second half-width;
+# lags the third, relative, because filters with one lag are implemented in several ways.
 _SAME = 0.008
 _FORMULA = 0.004
 _OF_A_LAG = 0.1
 
 
 class _Piece:
-    """Torque of an axis in one log, and what the gains of the file make of references and positions."""
+    """Torque of an axis in one log, and the torques that the stated gains make of references and positions."""
 
     def __init__(self, robot: Robot, log: Log, axis: int) -> None:
         time = log.sample_time_s
@@ -66,20 +68,20 @@ class _Piece:
         torque = np.ascontiguousarray(log.torque_nm[:, axis])
         period = int(1.0 / (self._band_hz * time))
         self._kept = free_of_limits(torque, period)
-        # What the controller took as the first speed no log knows.
+        # No log contains the speed that the controller used at the first sample.
         self._kept[: _BEGUN * period] = False
         self.torque = self._seen(torque)
 
     @property
     def gains(self) -> tuple[str, str]:
-        """What the two gains are of."""
+        """What the two gains act on, in words."""
         return ("position", "speed") if self._robot.told_positions else ("proportional", "integral")
 
     def shares(self, lag_s: float = 0.0, late: int = 0, damping: float = 0.0) -> Array:
-        """Return what the proportional and the integral gain ask for (n, 2) [Nm].
+        """Return the torques of the proportional and the integral gain (n, 2) [Nm].
 
-        ``lag_s``: of a filter on the speed, of the second order with a ``damping``; ``late``: samples by which
-        positions are read late.
+        ``lag_s``: lag of a filter on the speed, of the second order if it has a ``damping``. ``late``: samples
+        by which positions are read late.
         """
         speed = _filtered(self._speed, lag_s, damping, self._time)
         error, angle = self._reference - speed, self._angle
@@ -90,18 +92,18 @@ class _Piece:
         return np.column_stack([self._seen(x) for x in both])
 
     def forward(self) -> Array:
-        """Return the rate of the reference and the reference (n, 2) [rad/s^2, rad/s]."""
+        """Return the rate of the speed reference and that reference (n, 2) [rad/s^2, rad/s]."""
         rate = np.diff(self._moved, prepend=self._moved[:1]) / self._time
         return np.column_stack([self._seen(rate), self._seen(self._moved)])
 
     def _seen(self, x: Array) -> Array:
-        """Return a torque below the band, where no limit cuts it, without its mean."""
+        """Return a torque, low-passed to the band, without samples near a limit and without its mean."""
         low = lowpass(np.ascontiguousarray(x), self._time, self._band_hz)[self._kept]
         return np.asarray(low - low.mean()) if len(low) else low
 
 
 def _filtered(speed: Array, lag_s: float, damping: float, time_s: float) -> Array:
-    """Return a speed through a low-pass that lags slow motion by ``lag_s``; without damping of the first order."""
+    """Return a speed, low-passed so that slow motion lags by ``lag_s`` [s]; of the first order without ``damping``."""
     if not damping or not lag_s:
         keep = lag_s / (lag_s + time_s)
         return np.asarray(scipy.signal.lfilter([1 - keep], [1, -keep], speed))
@@ -118,10 +120,10 @@ def _later(x: Array, samples: int) -> Array:
 
 @dataclass(frozen=True)
 class _Law:
-    """A controller and the squares (n_logs,) that it leaves of the torque in every log.
+    """A controller's law, and the squared error (n_logs,) that it leaves of the torque in every log.
 
-    ``factors``: of the two gains; ``lag_s``: of the filter, of the second order with a ``damping``;
-    ``forward``: torque for the rate of the reference and for the reference.
+    ``factors`` (2,): multiples of the two stated gains; ``lag_s``: of the filter, of the second order with a
+    ``damping``; ``forward`` (2,): torque per rate of the speed reference and per speed reference.
     """
 
     factors: Array
@@ -136,18 +138,18 @@ class _Law:
 
 
 def is_continuous(robot: Robot) -> bool:
-    """Whether a law acts between its samples too."""
+    """Whether a controller acts between its samples too."""
     return _states_continuous(robot.toml) or robot.stepped is not None
 
 
 @cache
 def _states_continuous(toml: str) -> bool:
-    """Whether a robot file says so; asked for every log and axis, and read once."""
+    """Whether a robot file states a continuous controller. Cached: it is asked for every log and axis."""
     return bool(tomllib.loads(toml).get("controller", {}).get("continuous"))
 
 
 def other_controllers(robot: Robot, logs: Sequence[Log]) -> tuple[AlgebraicCause, ...]:
-    """Return what is different about the controller, axis by axis, where logs show it."""
+    """Return how the controller differs from the stated one, axis by axis; empty where logs do not show it."""
     controllers = (OTHER_GAINS[0], SPEED_FILTER[0], FEEDFORWARD[0])
     known = {e.axis for e in robot.effects if e.name in controllers}
     axes = [i for i in range(robot.n_axes) if i + 1 not in known]
@@ -173,7 +175,7 @@ def _clock(
     stated: Mapping[int, _Law],
     off: Sequence[int],
 ) -> AlgebraicCause | None:
-    """Return what a clock of its own explains on all axes whose commands are off."""
+    """Return the drift of a clock, if it explains the error of the stated law on all axes that have one."""
     if not off or robot.told_positions or any(e.name == CLOCK[0] for e in robot.effects):
         return None
 
@@ -200,7 +202,7 @@ def _of_axis(axis: int, stated: _Law, pieces: Sequence[_Piece]) -> list[Algebrai
 
 
 def _others(pieces: Sequence[_Piece]) -> Iterator[_Law]:
-    """Yield other controllers than the stated one, the simplest first."""
+    """Yield laws other than the stated one, the simplest first."""
     yield _law(pieces, _factors(pieces, 0.0), 0.0)
     for damping in _FILTERS:
         lag = _best_lag(pieces, lambda _lag: np.ones(2), damping)
@@ -225,7 +227,7 @@ def _law(
 
 
 def _fed_forward(pieces: Sequence[_Piece]) -> Array:
-    """Return the torque for rate and speed of the reference that leaves least of the command."""
+    """Return the torque per rate and per speed of the reference, by least squares on what the stated law misses."""
     missed = np.concatenate([p.torque - p.shares().sum(axis=1) for p in pieces])
     columns = np.concatenate([p.forward() for p in pieces])
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
@@ -233,7 +235,7 @@ def _fed_forward(pieces: Sequence[_Piece]) -> Array:
 
 
 def _factors(pieces: Sequence[_Piece], lag_s: float) -> Array:
-    """Return the factors of the two gains that leave least; one where a gain does nothing."""
+    """Return the factors of the two gains by least squares; one for a gain whose torque is zero."""
     shares = np.concatenate([p.shares(lag_s) for p in pieces])
     torque = np.concatenate([p.torque for p in pieces])
     size = np.linalg.norm(shares, axis=0)
@@ -246,7 +248,7 @@ def _factors(pieces: Sequence[_Piece], lag_s: float) -> Array:
 def _best_lag(
     pieces: Sequence[_Piece], factors: Callable[[float], Array], damping: float = 0.0
 ) -> float:
-    """Return the lag of a filter [s] that leaves least, the factors of the gains given by it."""
+    """Return the lag of a filter [s] with the smallest squared error; ``factors``: of the gains, for a lag."""
 
     def left(log_lag: float) -> float:
         lag = float(np.exp(log_lag))
@@ -260,10 +262,10 @@ def _best_lag(
 
 
 def _holds(law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> bool:
-    """Whether a controller gives nearly all that the stated one misses, in every log that shows it.
+    """Whether a law explains nearly all that the stated one misses, in every log where it misses something.
 
-    A filter resembles positions that are read a sample late, which it is not; so does feedforward
-    where the machine keeps to its reference.
+    A filter or feedforward must also fit better than positions that are read a sample late. These look like a
+    filter, and like feedforward where the machine follows its reference.
     """
     power = _power(pieces)
     shows = stated.left > _NOTHING * power
@@ -317,7 +319,7 @@ def _causes(axis: int, law: _Law, stated: _Law, pieces: Sequence[_Piece]) -> lis
 
 
 def check_gains(shown: Sequence[AlgebraicCause]) -> None:
-    """Raise InputError where a gain is so far from the stated one that no effect of the simulator has it."""
+    """Raise InputError for a gain that is farther from the stated one than the simulator's effect allows."""
     limits = {p.name: p for p in effect_info(OTHER_GAINS[0]).parameters}
     for cause in shown:
         if cause.name != OTHER_GAINS[0]:

@@ -1,8 +1,8 @@
-"""A controller of positions whose logs hold its references of speed: the speed loop that it is.
+"""Turns a controller of positions into the equal speed loop, if its logs hold speed references.
 
-``u = kp (phi_ref - phi) + kd (w_ref - w)`` with ``phi_ref`` the sum of ``w_ref`` is a ``pi_velocity`` with the gain
-``kd`` of speed and ``kp`` of the sum. As such machine and simulator run under the same references, which
-tells of elastic gears what inverse dynamics does not.
+``u = kp (phi_ref - phi) + kd (w_ref - w)``, with ``phi_ref`` the sum of ``w_ref``, is a ``pi_velocity`` with
+the proportional gain ``kd`` and the integral gain ``kp``. As a speed loop, machine and simulator can be
+compared under the same references, which shows more of elastic gears than inverse dynamics.
 """
 
 from __future__ import annotations
@@ -23,21 +23,22 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# What such a law may have that no speed loop has.
+# Options of a ``pd_position`` that no speed loop has.
 _OF_THE_ROBOT = ("gravity_compensation", "computed_torque")
 _MORE = (*_OF_THE_ROBOT, "continuous")
-# By how much a sample time may be off and still be that of the controller.
+# Largest relative difference between the sample times of a log and of the controller.
 _SAME_CLOCK = 1e-3
-# Of a motor's travel: targets that stray further from the sum of their rates are others.
+# Largest deviation of position targets from the sum of their speeds, relative to the travel of the motor or 1
+# rad.
 _SAME = 1e-6
 
 
 def as_speed_loop(robot: Robot, logs: Sequence[Log]) -> Robot:
-    """Return the robot with the speed loop that its ``pd_position`` is along logs of torques and speeds.
+    """Return the robot with its ``pd_position`` as a speed loop; unchanged if that is not the same law for all logs.
 
-    Or of torques alone, from which references may be recovered. As it is where a log has no torque, targets
-    without speeds or others than their sum; where gains are uncertain, or others than those stated
-    show, which are told by their names in the file.
+    All logs need torques, and speed references whose sum is the position target; or no references at all, so
+    that they may be reconstructed. The robot stays unchanged if its gains are uncertain. It also stays
+    unchanged if the logs show other gains: a cause names these as the robot file does.
     """
     if robot.controller_kind != "pd_position" or not _is_one(robot):
         return robot
@@ -53,7 +54,7 @@ def as_speed_loop(robot: Robot, logs: Sequence[Log]) -> Robot:
 
 
 def _is_one(robot: Robot) -> bool:
-    """Whether its law is one of samples, of the two gains alone, which are certain, and takes speeds."""
+    """Whether the law is sampled, uses speed references, and has two certain gains and no other option."""
     stated = tomlkit.parse(robot.toml).unwrap()["controller"]
     more = any(stated.get(name) for name in _MORE) or robot.stepped is not None
     return not more and robot.velocity_feedforward and not {"kp", "kd"} & robot.tolerances.keys()
@@ -75,10 +76,10 @@ def _as_one(robot: Robot) -> Robot:
 
 
 def other_controllers_of_targets(robot: Robot, logs: Sequence[Log]) -> tuple[AlgebraicCause, ...]:
-    """Return what is different about the controller of a ``pd_position``, where logs have torques and targets.
+    """Return how the controller of a ``pd_position`` differs from the stated one; empty if the logs cannot tell.
 
-    Nothing where these do not tell. Its law is algebra of samples where logs have those of the controller, and
-    of measured speeds where it is continuous. Gains so far from the stated ones that no effect has them are none.
+    Logs need torques and references, at the controller's sample time; for a continuous law, measured speeds
+    instead. Empty too if a gain is farther off than the simulator's effect allows.
     """
     if robot.controller_kind != "pd_position" or {"kp", "kd"} & robot.tolerances.keys():
         return ()
@@ -104,10 +105,10 @@ def _tells(robot: Robot, log: Log) -> bool:
 
 
 def with_integral(robot: Robot) -> Robot:
-    """Return a robot whose ``p_velocity`` has an integral too, as large as leaves the loop of its motors damped.
+    """Return the robot with an integral gain in its ``p_velocity``, which damps the loop of each motor critically.
 
-    Critically, of rigid axes: ``ki = kp^2 / (4 J)``. What keeps a simulator on a log has to keep its angle, too: with
-    none of its own it strays from the waves of a ripple, by what speeds are off.
+    For rigid axes: ``ki = kp^2 / (4 J)``. A loop that keeps a simulator on a log must also hold its angle.
+    Without an integral the angle drifts by the error of the speed, and the phase of a ripple is lost.
     """
     if robot.controller_kind != "p_velocity":
         return robot

@@ -1,10 +1,9 @@
-"""Torque limits that a log shows by itself: flat tops where the controller asks for more.
+"""Torque limits that logs show without a fit: flat tops where the controller asks for more.
 
-Many drives report the torque after their own limit. The machine got what the log says, so a
-simulator that is kept on the log has no error there; driven by the references, it has. But the
-command before the limit is algebra of references and measured positions, whatever the machine:
-where it lies beyond a flat top of the logged torque, and equals the torque elsewhere, the drive has
-cut it.
+Many drives report the torque after their own limit. A simulator that is kept on the log then has no error
+there; one that is driven by the references has. The command before the limit follows from references and
+measured positions, whatever the machine does. The drive has a limit if this command exceeds the flat tops of
+the logged torque and equals the torque elsewhere.
 """
 
 from __future__ import annotations
@@ -25,26 +24,26 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# A flat top has this many equal samples in a row, and all tops together this many.
+# Equal samples in a row that make a flat top, and samples in all flat tops together.
 _IN_A_ROW = 3
 _IN_ALL = 20
-# One limit for all logs: levels agree so well.
+# Relative width of one level. All flat tops of an axis must share one limit.
 _SAME_LEVEL = 1e-3
-# Share of the samples at a top where the command must lie beyond it, and share of the torque's
-# variance elsewhere that the command must give; what is left beyond is another controller.
+# Share of the flat-top samples where the command must exceed the limit, and share of the torque's variance
+# elsewhere that the command must explain. If it explains less, the machine has another controller.
 _BEYOND = 0.95
 _LAW_HOLDS = 0.99
 
 
 def torque_limits(robot: Robot, logs: Sequence[Log]) -> tuple[AlgebraicCause, ...]:
-    """Return the limits that logs with velocity references show, axis by axis."""
+    """Return the torque limits that logs with speed references show, by axis."""
     commands = [_command(robot, log) for log in logs]
     found = (_limit(i, logs, commands) for i in range(robot.n_axes))
     return tuple(x for x in found if x is not None)
 
 
 def missing(limits: Sequence[AlgebraicCause], robot: Robot) -> tuple[AlgebraicCause, ...]:
-    """Return the limits that a simulator does not have."""
+    """Return the limits among ``limits`` that the simulator does not have at this level."""
     own = {e.axis: e.values()[0] for e in robot.effects if e.name == TORQUE_LIMIT[0]}
 
     def differs(found: AlgebraicCause) -> bool:
@@ -55,9 +54,10 @@ def missing(limits: Sequence[AlgebraicCause], robot: Robot) -> tuple[AlgebraicCa
 
 
 def reported(torque: Array, limits: Sequence[AlgebraicCause], effects: Iterable[Effect]) -> Array:
-    """Return commanded torques (n, n_axes) [Nm] as drives that show ``limits`` report them.
+    """Return commanded torques (n, n_axes) [Nm] as the machine's drives would report them.
 
-    Cut at the limits among ``effects``, those of the simulator.
+    Drives with one of ``limits`` report the torque after the limit. On these axes the torque is cut at the
+    limit that the simulator has among ``effects``.
     """
     out = torque.copy()
     after = {x.axis for x in limits}
@@ -69,7 +69,7 @@ def reported(torque: Array, limits: Sequence[AlgebraicCause], effects: Iterable[
 
 
 def _command(robot: Robot, log: Log) -> Array:
-    """Return what the controller commands before any limit, but for a constant, (n, n_axes) [Nm]."""
+    """Return the command before any limit (n, n_axes) [Nm], up to a constant on each axis."""
     reference, time = log.velocity_ref_rad_s, log.sample_time_s
     assert reference is not None  # closed loop only
     position, speed = as_taken(log)
@@ -84,7 +84,7 @@ def _limit(axis: int, logs: Sequence[Log], commands: Sequence[Array]) -> Algebra
     if at_top.sum() < _IN_ALL or at_top.all():
         return None
     measured = np.concatenate(torques)
-    # What the controller starts from is constant along a log.
+    # The command is known up to a constant on each log, the controller's initial state.
     asked = np.concatenate(
         [
             c[:, axis] + np.median((u - c[:, axis])[~top]) if not top.all() else u
@@ -115,7 +115,7 @@ def _limit(axis: int, logs: Sequence[Log], commands: Sequence[Array]) -> Algebra
 
 
 def _flat(size: Array, level: float) -> NDArray[np.bool_]:
-    """Mark the samples (n,) of runs at a level."""
+    """Mark the samples (n,) of flat tops at a level."""
     flat = np.zeros(len(size), dtype=bool)
     for a, b in runs(size >= (1 - _SAME_LEVEL) * level):
         if b - a >= _IN_A_ROW:

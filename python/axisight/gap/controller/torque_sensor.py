@@ -1,7 +1,7 @@
-"""A torque that is reported too large: what looks like two causes and is one.
+"""A torque that is reported too large: one cause that looks like two.
 
-Where a drive reports a constant share of its torque, the logs show both gains of the controller off by
-that share, and the machine a torque constant off by its inverse. Three numbers that agree are no chance.
+If a drive reports its torque too large by a constant share, both gains of the controller seem off by that
+share, and the machine's torque constant by the inverse. Three numbers that agree are no coincidence.
 """
 
 from __future__ import annotations
@@ -15,19 +15,21 @@ from axisight.gap.facts.algebraic_cause import AlgebraicCause
 from axisight.gap.facts.named_cause import NamedCause
 from axisight.gap.facts.settings import Settings
 
-# The gains agree to this share, and the torque constant with their inverse to that.
+# Largest difference of the two gain errors [1], and of the torque constant from their inverse [1].
 _SAME_GAINS = 0.008
 _INVERSE = 0.02
-# Tolerances of an inertia up to which a torque constant may pass for it: three go unseen, five where logs are few.
+# Tolerances of the motor inertia by which a torque constant may be off without being seen as a cause. Usually
+# three are absorbed by the inertia; with few logs, five.
 _EDGE = 5.0
-# Gains alone agree to this share of theirs: of two that were set, one in fifty would.
+# Largest difference of the two gain errors, relative to them, if no torque constant was found. Two unrelated
+# errors agree so well in one of fifty cases.
 _ALONE = 0.02
 
 
 def with_torque_sensors(
     causes: Sequence[NamedCause], effects: Sequence[Effect]
 ) -> tuple[tuple[NamedCause, ...], tuple[Effect, ...]]:
-    """Return causes and effects with one in the place of each such pair."""
+    """Return causes and effects with each pair of other gains and torque constant replaced by a torque sensor."""
     kept, acting = list(causes), list(effects)
     for gains in [c for c in causes if c.effect == OTHER_GAINS[0]]:
         found = sensor_of(gains, kept)
@@ -43,7 +45,10 @@ def with_torque_sensors(
 
 
 def sensor_of(gains: NamedCause, causes: Sequence[NamedCause]) -> tuple[int, NamedCause] | None:
-    """Return which of ``causes`` is the torque constant that makes gains those of a torque sensor, and that."""
+    """Return the torque sensor for other gains, and the index in ``causes`` of the torque constant that belongs to it.
+
+    None if no torque constant agrees with the gains.
+    """
     for place, cause in enumerate(causes):
         if (cause.effect, cause.axis) == (TORQUE_CONSTANT[0], gains.axis) and _agree(gains, cause):
             return place, _sensor(gains, cause)
@@ -51,7 +56,7 @@ def sensor_of(gains: NamedCause, causes: Sequence[NamedCause]) -> tuple[int, Nam
 
 
 def share_reported(cause: AlgebraicCause) -> float | None:
-    """Return the share by which a torque is reported too large, where both gains are off by one; else None."""
+    """Return the share by which a torque is reported too large; None if the two gains are not off by one share."""
     if cause.name != OTHER_GAINS[0] or not cause.values.keys() >= set(OTHER_GAINS[1]):
         return None
     proportional, integral = (cause.values[name].value for name in OTHER_GAINS[1])
@@ -60,24 +65,21 @@ def share_reported(cause: AlgebraicCause) -> float | None:
 
 @dataclass(frozen=True)
 class Asked:
-    """What the controller's law asks for of the machine: an effect with its value.
-
-    ``share`` by which a drive reports its torque too large.
-    """
+    """The effect, with its value, that the motion must show if a drive reports its torque too large by ``share``."""
 
     effect: Effect
     share: float
 
     def off(self, found: Effect) -> float:
-        """Return by what share the effect that a fit found is off the one asked for [1]."""
+        """Return the relative difference between a fitted effect and the expected one [1]."""
         (error,) = found.values()
         return abs((1 + error) * (1 + self.share) - 1)
 
 
 def asked_of_motion(shown: Sequence[AlgebraicCause]) -> dict[str, Asked]:
-    """Return what the machine's motion shows of torques that are reported wrong, by label.
+    """Return the effects that the motion must show if other gains are a wrong torque sensor, by label.
 
-    A drive that reports a share of its torque: of a torque constant the inverse of that.
+    A torque reported too large by a share looks like a torque constant off by the inverse.
     """
     out = {}
     for cause in shown:
@@ -90,22 +92,25 @@ def asked_of_motion(shown: Sequence[AlgebraicCause]) -> dict[str, Asked]:
 
 
 def unseen_constant(settings: Settings) -> float:
-    """Return up to which share a torque constant may not show."""
+    """Return the largest error of a torque constant [1] that may stay unseen."""
     return _EDGE * (settings.tolerances or {}).get("motor_inertia", 0.0)
 
 
 def either(causes: Sequence[NamedCause], unseen: float) -> tuple[tuple[str, str], ...]:
-    """Return the labels of gains that may be a torque sensor's, each with that.
+    """Return the labels of other gains that may be a wrong torque sensor, each with the label of that sensor.
 
-    Both are off by one share, and by so little that a torque constant, which is ``unseen`` up to that
-    share, would not show.
+    Both gains are off by the same share. It is so small that the torque constant of a wrong sensor, ``unseen``
+    up to that share, would not show.
     """
     alone = [c for c in causes if c.effect == OTHER_GAINS[0] and _small_and_one(c, unseen)]
     return tuple((c.label, Effect(TORQUE_SENSOR[0], c.axis).label) for c in alone)
 
 
 def _has_both(gains: NamedCause) -> bool:
-    """Whether both gains were found and no other: to positions others are fitted, without a torque sensor."""
+    """Whether exactly the two gains were found.
+
+    Where positions are compared, other gains are fitted. A torque sensor does not show there.
+    """
     return gains.parameters.keys() == set(OTHER_GAINS[1])
 
 
