@@ -1,1 +1,1 @@
-"""Measured signals for themselves: motion, noise, filters, steps of encoders, standstill."""
+"""Properties of measured signals: motion, noise, filters, encoder steps, standstill."""

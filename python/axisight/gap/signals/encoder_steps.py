@@ -1,4 +1,4 @@
-"""Steps of encoders that are coarser than the stated sensor."""
+"""Steps of encoders that are coarser than the noise of the stated sensor."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 
 OF_A_STEP = 0.01
-"""By how much of a step logs of one encoder may differ in it."""
+"""Largest relative difference between the steps of one encoder in several logs."""
 
 
 def encoder_steps(robot: Robot, logs: Sequence[Log]) -> Array:
-    """Return the step of each position (n_axes,) [rad], where its noise exceeds the sensor's; else zero.
+    """Return the step of each axis' position (n_axes,) [rad] if its noise exceeds the stated sensor noise; else zero.
 
-    Not where the simulator has steps itself, and not where a log shows none.
+    Zero too if the simulator has encoder steps on that axis, if a log shows none, or if the steps of the logs
+    differ by more than 1 %.
     """
     known = {e.axis for e in robot.effects if e.name == STEPS[0] and e.acts}
     out = np.zeros(robot.n_axes)
@@ -37,6 +38,6 @@ def encoder_steps(robot: Robot, logs: Sequence[Log]) -> Array:
 
 
 def as_effect(axis: int, step_rad: float) -> Effect:
-    """Return the effect that steps of positions of an axis (from 0) are, with its size as its one parameter."""
+    """Return encoder steps of ``step_rad`` [rad] on an axis (from 0) as an effect."""
     name, increment = STEPS
     return Effect(name, axis + 1, {increment: step_rad})

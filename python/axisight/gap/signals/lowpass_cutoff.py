@@ -1,4 +1,4 @@
-"""The low-pass of inverse dynamics, and whose velocity it takes, from the data."""
+"""Chooses the cutoff of inverse dynamics, and between measured and differentiated velocity, from the logs."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Below the first resonance of most machines, above the spectrum of their motions.
+# Range of cutoffs [Hz] that are tried: below the first resonance of most machines, above most of their motion.
 _HIGHEST_HZ = 60.0
 _LOWEST_HZ = 2.0
-# A log has at least this many samples in a period of the cutoff.
+# Smallest number of samples in a period of the cutoff.
 _OVERSAMPLING = 5.0
-# Of the first elastic mode, up to which gears are as good as rigid.
+# Share of the frequency of the first elastic mode up to which gears count as rigid.
 _RIGID = 1 / 3
-# Corner of the sign of the speed, as a share of the largest speed.
+# Speed where the smoothed sign turns, as a share of the largest speed.
 _CORNER = 0.01
-# A measured velocity has to leave less by this share than one differentiated from the position.
+# Share by which a measured velocity must lower the held-out error to be preferred to a differentiated position.
 _CLEARLY = 0.02
 
 
 def highest_cutoff_hz(sample_time_s: float) -> float:
-    """Return the highest cutoff that is worth trying at a sample time."""
+    """Return the highest cutoff [Hz] that is tried at a sample time."""
     return min(_HIGHEST_HZ, 1 / (_OVERSAMPLING * sample_time_s))
 
 
 def rigid_below_hz(robot: Robot) -> float:
-    """Return up to which frequency the torque of a robot is that of rigid gears [Hz]; infinity where they are.
+    """Return the frequency [Hz] up to which the gears of a robot count as rigid; infinity for a rigid robot.
 
-    A third of its first elastic mode: the masses behind a gear move by a ninth more there.
+    A third of its first elastic mode. A mass behind the gear moves by a ninth more than the motor there.
     """
     if all(robot.axis_is_rigid):
         return float("inf")
     modes = robot.modes()
     swings = np.abs(modes["eigenvalue_rad_s"].values.imag) / (2 * np.pi)
-    # What swings more slowly hangs in gravity.
+    # Slower modes are pendulum motions under gravity.
     elastic = swings[swings > _LOWEST_HZ]
     return float(elastic.min()) * _RIGID if len(elastic) else float("inf")
 
@@ -54,21 +54,22 @@ def chosen_filtering(
     measured: Mask | None = None,
     highest_hz: float = float("inf"),
 ) -> Filtering:
-    """Return the filtering whose motion predicts torque best on data left out.
+    """Return the filtering whose motion predicts torque best on held-out data.
 
-    ``predict`` is the torque of the rigid simulator along a motion. On every axis the torque *as
-    logged* is regressed on the predicted one, the speed, its sign and an offset, on one half of
-    each log, and predicted on the other: what a low cutoff takes from the motion and what a high
-    one leaves of the noise both count. Cutoffs up to ``highest_hz`` are tried in half octaves, unless
-    ``cutoff_hz`` is given; with the best of them, the measured velocity of the axes that have one: ``measured``
-    (n_axes,), by default those of these logs.
+    ``predict``: torque of the rigid simulator along a motion. For each axis the torque *as logged* is regressed
+    on the predicted torque, the speed, its sign and an offset. The fit uses one half of each log and predicts
+    the other. A low cutoff costs part of the motion, a high one leaves noise; the held-out error counts both.
+
+    Without ``cutoff_hz``, cutoffs up to ``highest_hz`` are tried in half octaves. The best one is then tried
+    with the measured velocity of the axes ``measured`` (n_axes,); by default the axes that have one in all
+    logs.
     """
     highest = max(min(highest_cutoff_hz(logs[0].sample_time_s), highest_hz), _LOWEST_HZ)
     count = int(2 * np.log2(highest / _LOWEST_HZ)) + 1
     grid = highest * 2.0 ** (-np.arange(max(count, 1)) / 2)
     best = cutoff_hz
     if best is None:
-        # Relative changes count: an axis that nothing predicts does not choose for the others.
+        # Relative errors: an axis that no cutoff predicts does not choose for the others.
         errors = [
             np.log(np.maximum(held_out_error(logs, predict, float(f)), 1e-300)).sum() for f in grid
         ]
@@ -90,9 +91,10 @@ def held_out_error(
     cutoff_hz: float,
     measured: Sequence[bool] = (),
 ) -> Array:
-    """Return the squared error on the other half, relative to the torque's, of every axis (n_axes,).
+    """Return the squared error on the held-out halves, relative to the torque's variance (n_axes,).
 
-    From motions with plain ends, which speak against cutoffs that smear far.
+    The motion is extended without curvature at its ends, so that low cutoffs, which smear the ends far, do
+    worse.
     """
     moved = [motion(log, cutoff_hz, measured, curved=False) for log in logs]
     rigid = np.concatenate([predict(m) for m in moved])
@@ -112,11 +114,11 @@ def held_out_error(
 
 
 def columns(rigid: Array, speed: Array) -> Array:
-    """Return what an axis is regressed on (n, 4): prediction, speed, its sign, an offset."""
+    """Return the columns of the regression of one axis (n, 4): predicted torque, speed, its sign, an offset."""
     return np.stack([rigid, speed, direction(speed), np.ones(len(speed))], axis=1)
 
 
 def direction(speed: Array) -> Array:
-    """Return the sign of a speed (n,), rounded off below a hundredth of the largest."""
+    """Return the sign of a speed (n,), smoothed below 1 % of the largest speed."""
     corner = _CORNER * max(float(np.abs(speed).max()), 1e-12)
     return np.asarray(speed / np.sqrt(speed**2 + corner**2))

@@ -1,4 +1,4 @@
-"""The motion of a log, low-passed: what inverse dynamics predicts a torque from."""
+"""The low-passed motion of a log, from which inverse dynamics predicts a torque."""
 
 from __future__ import annotations
 
@@ -18,58 +18,58 @@ Motion = tuple[Array, Array, Array, Array]
 """Position, velocity, acceleration and torque, each (n, n_axes), motor side."""
 
 
-# The motion's own low-pass lies this far above the cutoff: it takes 0.4 % of the motion there.
+# Ratio of the motion's own cutoff to that of the torques. The motion's low-pass takes 0.4 % at the torques'
+# cutoff.
 _ABOVE = 2.0
-# Of the rate of a log, up to which a low-pass is one.
+# Largest cutoff of a low-pass, as a share of the sample rate.
 _BELOW_NYQUIST = 0.45
-# Periods of the cutoff after which its low-pass has forgotten all but a thousandth.
+# Periods of the cutoff after which the low-pass's response is below 0.1 %.
 _RINGS = 3.0
-# Of the gain of the low-pass, which runs forward and backward.
+# Order of the low-pass's gain. It is twice the filter's order, since the filter runs forward and backward.
 _ORDER = 2 * LOWPASS_ORDER
-# Of a log that begins or ends in motion, periods of the cutoff until what was before or after it is forgotten
-# to a hundredth, and the largest share of the log at either end.
+# Length of an end in motion that is left out, in periods of the cutoff: the torque beyond the end counts for 1
+# % after it. And the largest length, as a share of the log.
 _FORGETS = 1.5
 _AT_MOST = 0.2
-# Of that, over which what is next to it counts in part.
+# Length of the ramp after a left-out end, as a share of that end.
 _FADES = 1 / 3
-# A log is at rest at an end where no axis moves by this share of the most that it does in a quarter of a period.
+# Motion of an axis, as a share of its largest in a quarter of a period, below which the axis is at rest.
 _RESTS = 0.02
 
 
 @dataclass(frozen=True)
 class Filtering:
-    """How a motion is made of a log, and torques compared.
+    """How a motion is made of a log, and how torques are low-passed before they are compared.
 
-    Torques predicted and measured pass the same low-pass of ``cutoff_hz``: what friction makes of a
-    reversal is smeared on both sides alike. The motion that a torque is predicted from passes one an
-    octave above. ``measured`` (n_axes): whether velocity and acceleration of an axis come from its
-    measured velocity instead of its position.
+    Predicted and measured torques pass the same low-pass of ``cutoff_hz``, so that a reversal of friction is
+    smeared alike in both. The motion for the prediction passes a low-pass one octave higher. ``measured``
+    (n_axes): whether the velocity and acceleration of an axis come from its measured velocity, not from its
+    position.
     """
 
     cutoff_hz: float
     measured: tuple[bool, ...] = ()
 
     def __call__(self, log: Log) -> Motion:
-        """Return the motion of a log, and its torque as it is."""
+        """Return the low-passed motion of a log with its torque as logged."""
         cutoff_hz = self.motion_cutoff_hz(log.sample_time_s)
         position, velocity, acceleration, _ = motion(log, cutoff_hz, self.measured)
         return position, velocity, acceleration, np.ascontiguousarray(log.torque_nm)
 
     def motion_cutoff_hz(self, sample_time_s: float) -> float:
-        """Return the cutoff of the low-pass that the motion itself passes."""
+        """Return the cutoff [Hz] of the low-pass for the motion."""
         highest = max(self.cutoff_hz, _BELOW_NYQUIST / sample_time_s)
         return min(_ABOVE * self.cutoff_hz, highest)
 
     def compared(self, torque_nm: Array, sample_time_s: float) -> Array:
-        """Return a torque (n, n_axes), predicted or measured, as it is compared."""
+        """Return a predicted or measured torque (n, n_axes), low-passed for the comparison."""
         return lowpass(torque_nm, sample_time_s, self.cutoff_hz)
 
     def counted(self, log: Log) -> Array:
-        """Return what every sample of a compared torque counts for (n,), from 0 to 1.
+        """Return the weight of each sample of a compared torque (n,), from 0 to 1.
 
-        A low-pass needs the torque before and after a log. At rest it goes on as it is; in motion nobody
-        knows it, and what the ends are padded with is no torque of a machine: such ends count for nothing,
-        and what is next to them for a part.
+        The low-pass needs torque before and after the log. If the log begins or ends at rest, that torque is
+        constant. In motion it is unknown: such an end has weight 0, followed by a smooth ramp to 1.
         """
         n, cutoff = log.n_samples, self.cutoff_hz * log.sample_time_s
         away = min(round(_FORGETS / cutoff), int(_AT_MOST * n))
@@ -84,7 +84,7 @@ class Filtering:
         return out
 
     def spread(self, size_nm: Array, sample_time_s: float) -> Array:
-        """Return how large (n, n_axes) `compared` leaves a torque of that size and unknown sign at most."""
+        """Return the largest size (n, n_axes) after `compared` of a torque of this size and of unknown sign."""
         reach = round(_RINGS / (self.cutoff_hz * sample_time_s))
         impulse = np.zeros((4 * reach + 1, 1))
         impulse[2 * reach] = 1.0
@@ -92,12 +92,12 @@ class Filtering:
         return np.asarray(scipy.ndimage.convolve1d(size_nm, answer, axis=0, mode="nearest"))
 
     def gain(self, frequency_hz: Array) -> Array:
-        """Return the gain of `compared` (n_freq,)."""
+        """Return the gain of the low-pass of `compared` (n_freq,)."""
         return np.asarray(1 / (1 + (frequency_hz / self.cutoff_hz) ** _ORDER))
 
 
 def _moves(log: Log, cutoff: float) -> tuple[bool, bool]:
-    """Return whether a log begins and whether it ends in motion; ``cutoff``: periods in a sample."""
+    """Return whether a log begins and whether it ends in motion; ``cutoff``: in periods per sample."""
     length = max(2, min(round(0.25 / cutoff), log.n_samples // 2))
     parts = [
         np.ptp(log.position_rad[i : i + length], axis=0)
@@ -112,10 +112,12 @@ def motion(
 ) -> Motion:
     """Return position, velocity, acceleration and torque (n, n_axes), low-passed alike.
 
-    ``curved``: beyond the ends of a log motion goes on as curved as it is. Torque does not:
-    friction breaks it, and a curvature across a break is none.
-    ``measured``: the axes whose velocity is the measured one, low-passed, and whose acceleration
-    is its derivative. Raises InputError where the log has none.
+    - ``curved``: motion is extended beyond the ends of the log with its curvature. Torque never is: friction
+      breaks it at reversals, and a curvature across a break has no meaning.
+    - ``measured`` (n_axes): axes whose velocity is the measured one, low-passed, and whose acceleration is its
+      derivative.
+
+    Raises InputError if ``measured`` names an axis and the log has no velocity.
     """
     velocity, acceleration = differentiate(
         log.position_rad, log.sample_time_s, cutoff_hz, curved=curved
@@ -134,7 +136,7 @@ def motion(
 
 
 def has_velocity(logs: Sequence[Log]) -> NDArray[np.bool_]:
-    """Return the axes (n_axes,) whose velocity every log has measured."""
+    """Return whether every log has a measured velocity of an axis (n_axes,)."""
     measured = [
         np.zeros(log.n_axes, bool)
         if log.velocity_rad_s is None

@@ -1,4 +1,4 @@
-"""The floor: what sensor noise leaves in the torque, and the weight of residuals it implies."""
+"""The floor: torque from sensor noise, and the weights of residuals that follow from it."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from axisight.logs import Log
 
 Array = NDArray[np.float64]
 
-# Samples of a segment of which densities are averaged (Welch 1967).
+# Largest number of samples in a segment of a spectral density (Welch 1967).
 _SEGMENT = 2048
-# Samples of a log of which a tenth of the lines say little.
+# Logs of at most so many samples have too few frequencies in the top fifth of the spectrum; they use the top
+# two.
 _SHORT = 4000
 
 
@@ -23,11 +24,11 @@ _SHORT = 4000
 class Floor:
     """Noise in the commanded torque of a closed loop.
 
-    ``position_std_rad`` (n_axes,): standard deviation of the position noise;
-    ``frequency_hz`` (n_freq,) and ``noise`` (n_axes, n_freq): torque noise
-    density, scaled so that white noise has its variance; ``weighting``: whitens
-    noise plus model error; ``expected`` (n_axes,): mean square of a weighted
-    residual that is noise only.
+    - ``position_std_rad`` (n_axes,): standard deviation of the position noise.
+    - ``frequency_hz`` (n_freq,), ``noise`` (n_axes, n_freq): density of the torque noise, scaled so that white
+      noise has its variance.
+    - ``weighting``: whitens noise plus model error.
+    - ``expected`` (n_axes,): mean square of a weighted residual that is noise only.
     """
 
     position_std_rad: Array
@@ -38,19 +39,19 @@ class Floor:
 
 
 def position_noise_std(logs: list[Log]) -> Array:
-    """Estimate white position noise (n_axes,) [rad] from the top fifth of the spectrum.
+    """Estimate white position noise (n_axes,) [rad] from the top fifth of the spectrum, the median over the logs.
 
-    Motion has no power there; what is left is the sensor. Median over the logs. Of short logs the top
-    two fifths: a hundred lines are off by a twentieth, and a floor by a tenth.
+    Motion has no power there. For short logs the top two fifths are used: with one hundred frequencies the
+    estimate is off by 5 %, and the floor by 10 %.
     """
     estimates = [white_std(log.position_rad, log.sample_time_s) for log in logs]
     return np.asarray(np.median(np.array(estimates), axis=0))
 
 
 def white_std(x: Array, sample_time_s: float) -> Array:
-    """Return the standard deviation of white noise (n_axes,) on a signal (n, n_axes), as `position_noise_std`."""
+    """Return the standard deviation of white noise (n_axes,) on a signal (n, n_axes), as in `position_noise_std`."""
     rate = 1.0 / sample_time_s
-    # Twice differenced, motion is out of the way of leakage; white noise keeps its level.
+    # Second differences remove slow motion, which would leak into the top; white noise stays.
     f, density = scipy.signal.welch(
         np.diff(x, n=2, axis=0), rate, nperseg=min(_SEGMENT, len(x) // 2), axis=0
     )
@@ -60,21 +61,21 @@ def white_std(x: Array, sample_time_s: float) -> Array:
 
 
 def segment_of(log: Log) -> int:
-    """Return the length of the segments that a spectrum of a log is averaged over."""
+    """Return the number of samples in a segment of a log's spectral density."""
     return min(_SEGMENT, log.n_samples // 2)
 
 
 SLOW = 2
-"""First frequencies of a density of segments without their mean, which has next to nothing there."""
-# Neighbouring frequencies that a density of noise is averaged over.
+"""Number of the lowest frequencies where the density has almost no power, since each segment's mean is taken off."""
+# Number of neighbouring frequencies in the average of a noise density.
 _NEIGHBOURS = 51
 
 
 def smoothed(density: Array, shape: Array) -> Array:
-    """Return a sampled density (n_axes, n_freq) with a smooth ratio to one of about its ``shape``.
+    """Return a sampled density (n_axes, n_freq), smoothed as a ratio to a density of similar ``shape``.
 
-    A density of few segments is off by a quarter at every frequency. Weights by its inverse would count
-    noise most where it is said too small, and that noise alone leaves more than it is said to.
+    With few segments a density is off by 25 % at each frequency. Weights by its inverse would be largest where
+    it is too small, and noise alone would leave a residual above the expected one.
     """
     ratio = density / shape
     ratio[:, :SLOW] = ratio[:, [SLOW]]
@@ -82,6 +83,6 @@ def smoothed(density: Array, shape: Array) -> Array:
 
 
 def torque_density(x: Array, rate: float, segment: int) -> tuple[Array, Array]:
-    """Return frequencies and density (n_axes, n_freq), scaled so that white noise has its variance."""
+    """Return frequencies [Hz] and density (n_axes, n_freq), scaled so that white noise has its variance."""
     f, density = scipy.signal.welch(x, rate, nperseg=segment, axis=0, detrend="constant")
     return f, np.asarray(density.T * rate / 2)

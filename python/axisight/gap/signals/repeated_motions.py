@@ -1,4 +1,4 @@
-"""Motions that a log or several repeat: what differs between them no model explains."""
+"""Finds repeated motions in logs: no model explains the difference between repeats."""
 
 from __future__ import annotations
 
@@ -12,18 +12,17 @@ from axisight.logs import Log
 
 Array = NDArray[np.float64]
 
-# Positions of a repeated motion differ by less than this share of their range, on every axis:
-# controllers repeat themselves to a thousandth, and other motions are not alike by chance. Positions of
-# multisines on one square wave are: speeds tell them apart, which have more noise.
+# Largest rms difference of the positions of repeats, and of their speeds, as a share of the range of an axis.
+# Controllers repeat a motion to 0.1 %. Different multisines on one square wave have similar positions; only
+# their speeds, which have more noise, tell them apart.
 _SAME = 0.01
 _SAME_SPEED = 0.02
 
 
 def repeated_std_nm(logs: Sequence[Log], filtering: Filtering) -> Array | None:
-    """Return the standard deviation (n_axes,) [Nm] of the low-passed torque between repeats.
+    """Return the standard deviation (n_axes,) [Nm] of the low-passed torque between repeats; None without repeats.
 
-    Repeats are logs of one motion, and the periods of a periodic log. None where nothing is
-    repeated.
+    Repeats are logs of one motion, and the periods of a periodic log.
     """
     groups: list[list[Motion]] = []
     for log in logs:
@@ -43,7 +42,10 @@ def repeated_std_nm(logs: Sequence[Log], filtering: Filtering) -> Array | None:
 
 
 def _periods(log: Log, whole: Motion) -> list[Motion]:
-    """Return a motion cut into its periods, the first left out while it may settle."""
+    """Return the periods of a motion, or the whole motion if it has fewer than three.
+
+    The first period is left out, since the motion may still settle.
+    """
     length = 0 if log.period_s is None else round(log.period_s / log.sample_time_s)
     count = log.n_samples // length if length else 0
     if count < 3:
@@ -59,6 +61,6 @@ def _same(one: Motion, other: Motion) -> bool:
 
 
 def _alike(one: Array, other: Array, share: float) -> bool:
-    """Whether signals (n, n_axes) differ by less than a share of their range, on every axis."""
+    """Whether two signals (n, n_axes) differ by less than a share of their range on every axis."""
     allowed = share * np.maximum(np.ptp(one, axis=0), 1e-12)
     return bool(np.all(np.sqrt(np.mean((one - other) ** 2, axis=0)) <= allowed))

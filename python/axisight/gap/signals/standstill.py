@@ -1,8 +1,8 @@
-"""What dry friction leaves open: where a motor stands or turns round, it may hold any torque in a band.
+"""The torque that dry friction leaves open where a motor stands or turns round.
 
-A rigid model with friction predicts the torque of a moving axis. Of a standing one it knows no
-more than that the torque lies within the dry friction around it: brakes, stiction and the way the
-axis came there decide. Such samples are weighed by how little they can tell, not left out.
+A rigid model with friction predicts the torque of a moving axis. For a standing axis it predicts only a band as
+wide as the dry friction: brakes, stiction and the way to the stop decide where in the band the torque lies.
+Such samples stay in the comparison with smaller weights.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def dry_friction_nm(motions: Sequence[Motion], predict: Callable[[Motion], Array]) -> Array:
-    """Return the dry friction of every axis (n_axes,) [Nm], by least squares; zero where it drives.
+    """Return the dry friction of every axis (n_axes,) [Nm], by least squares; zero instead of a negative one.
 
     ``predict``: torque of the rigid simulator without effects along a motion.
     """
@@ -35,17 +35,17 @@ def dry_friction_nm(motions: Sequence[Motion], predict: Callable[[Motion], Array
     return out
 
 
-# Share of the samples that have to run each way for a friction to be told from an offset, and share
-# of the top speed that a log has to reach to tell it.
+# Smallest share of the samples in each direction, which separates friction from an offset. And the smallest top
+# speed of a log for an estimate, as a share of the top speed in all logs.
 _EACH_WAY = 0.01
 _MOVES = 0.1
 
 
 def sure_friction_nm(motions: Sequence[Motion], predict: Callable[[Motion], Array]) -> Array:
-    """Return the dry friction that every axis shows in all logs that run it both ways (n_axes,) [Nm].
+    """Return the smallest dry friction (n_axes,) [Nm] among the logs that move an axis in both directions.
 
-    Elasticity, which a rigid prediction lacks, passes for friction in one log and not in another. Zero
-    where an axis runs one way only.
+    The rigid prediction lacks elasticity, which may look like friction in single logs. Zero for an axis without
+    such a log.
     """
     found = np.array([dry_friction_nm([m], predict) for m in motions])
     top = np.max([np.abs(m[1]).max(axis=0) for m in motions], axis=0)
@@ -58,25 +58,25 @@ def sure_friction_nm(motions: Sequence[Motion], predict: Callable[[Motion], Arra
 
 
 def open_torque_nm(motions: Sequence[Motion], friction_nm: Array) -> list[Array]:
-    """Return the standard deviation that dry friction leaves open in every sample [(n, n_axes)] [Nm].
+    """Return the standard deviation (n, n_axes) [Nm] of the torque that dry friction leaves open at each sample.
 
-    That of a uniform band at standstill; falling with the square of the speed above a hundredth
-    of the largest of all motions.
+    At standstill it is that of a uniform band; it falls with the square of the speed above 1 % of the top speed
+    of all motions.
     """
     return [still * friction_nm / np.sqrt(3) for still in standing(motions)]
 
 
 def standing(motions: Sequence[Motion]) -> list[Array]:
-    """Return how far every sample stands, from 0 to 1 [(n, n_axes)]: a half at a hundredth of the top speed."""
+    """Return how far each sample is at standstill (n, n_axes): 1 at rest, 0.5 at 1 % of the top speed, 0 in motion."""
     lengths = np.cumsum([len(m[1]) for m in motions])[:-1]
     speed = np.concatenate([m[1] for m in motions])
     return np.split(1 - np.stack([direction(v) ** 2 for v in speed.T], axis=1), lengths)
 
 
 def alike(still: Array) -> Array:
-    """Return how many samples stand together with each (n, n_axes), one where the axis moves.
+    """Return the number of samples in the standstill around each sample (n, n_axes); one where the axis moves.
 
-    What is open is one and the same torque, or law, all along such a stretch.
+    The open torque is the same throughout one standstill, so its samples are not independent.
     """
     out = np.ones(still.shape)
     for axis, stands in enumerate(still.T > 0.5):
@@ -87,21 +87,22 @@ def alike(still: Array) -> Array:
 
 
 def certainty(open_nm: Array, error_nm: Array) -> Array:
-    """Return the factor on errors (n, n_axes): error of the model over that and what is open."""
+    """Return the factor on errors (n, n_axes): model error over the root of squared model error and open torque."""
     return np.asarray(error_nm / np.sqrt(error_nm**2 + open_nm**2))
 
 
-# Over which errors count together [s]: longer than a period of what a loop rings with.
+# Length of the moving average over squared errors [s], longer than a period in which a loop rings.
 _TOGETHER_S = 0.1
 
 
 def open_errors(
     speed: Array, friction_nm: Array, weighting: Weighting, sample_time_s: float
 ) -> Array:
-    """Return the weighted error that dry friction leaves open around every residual (n, n_axes), rms.
+    """Return the rms of the weighted error that dry friction leaves open around each residual (n, n_axes).
 
-    ``speed`` (n_samples, n_axes). What laws of dry friction differ by where a motor turns round or
-    stands: an abrupt sign and a rounded one, and a torque held.
+    ``speed`` (n_samples, n_axes) [rad/s]. Near standstill friction laws differ by an abrupt or a smooth sign,
+    and by a torque that holds the axis. The error is what these differences make of ``friction_nm`` (n_axes,)
+    [Nm].
     """
     smooth = np.stack([direction(v) for v in speed.T], axis=1)
     differ = [np.sign(speed) - smooth, 1 - smooth**2]

@@ -1,10 +1,11 @@
-"""Factors that are units: which name a channel gets that is that many times too large."""
+"""Names the unit of a channel from the factor by which it is too large."""
 
 from __future__ import annotations
 
 import math
 
-# Exact enough for a ratio of filtered signals, far enough from any other unit.
+# Largest relative difference from a unit's factor: ratios of filtered signals are that exact, and no other unit
+# is as near.
 _TOLERANCE = 0.04
 _DEG = 180.0 / math.pi
 
@@ -19,18 +20,18 @@ _VELOCITY_REF = {
     "velocity_ref_in_rev_s": 0.5 / math.pi,
     "velocity_ref_in_mrad_s": 1000.0,
 }
-# Factors of torques in other units [1].
+# Factors of torques in other units than Nm [1].
 _TORQUE = {"torque_in_mnm": 1000.0, "torque_in_knm": 0.001}
-# Bits of an encoder per turn of the motor: catalogues have none with fewer or more.
+# Range of the bits per motor turn in encoder catalogues.
 _LEAST_COUNT_BITS = 8
 _MOST_COUNT_BITS = 30
 
 
 def scale_name(field: str, factor: float, gear_ratio: float) -> str:
-    """Return the name of a channel ``factor`` times too large.
+    """Return the name of the fault of a channel that is ``factor`` times too large.
 
-    ``field``: ``position``, ``velocity_ref`` or ``torque``; ``gear_ratio``: joint angle per motor
-    angle of its axis. An unknown factor gives ``position_scaled`` and so on.
+    ``field``: ``position``, ``velocity_ref`` or ``torque``; ``gear_ratio``: joint angle per motor angle of its
+    axis. An unknown factor gives ``position_scaled`` and so on.
     """
     factor, ratio = abs(factor), abs(gear_ratio)
     tables = {"position": _POSITION, "velocity_ref": _VELOCITY_REF, "torque": _TORQUE}
@@ -46,7 +47,7 @@ def scale_name(field: str, factor: float, gear_ratio: float) -> str:
 
 
 def _is_count(factor: float) -> bool:
-    """Whether a turn has a power of two, or a whole thousand, of units."""
+    """Whether one turn has a power of two, or a whole number of thousands, of units."""
     per_turn = 2 * math.pi * factor
     bits = math.log2(per_turn) if per_turn > 0 else 0.0
     if not _LEAST_COUNT_BITS <= bits <= _MOST_COUNT_BITS:
