@@ -1,1 +1,1 @@
-"""The user's simulator: its own parameters and their tolerances, and the torque that it predicts."""
+"""The user's simulator: its own parameters, their tolerances, and the torque that it predicts."""

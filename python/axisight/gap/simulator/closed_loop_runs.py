@@ -1,4 +1,4 @@
-"""Torques of simulators in closed loop, along the references of logs."""
+"""Torques and positions of closed-loop simulations along the references of logs."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 def simulated_torques(
     robot: Robot, variant: Variant, logs: Sequence[Log], *, threads: int = 0
 ) -> list[Array]:
-    """Return the commanded torque (n, n_axes) [Nm] of a simulator along the references of logs.
+    """Return the commanded torque (n, n_axes) [Nm] of a simulator along the references of each log.
 
-    Where the simulation fails (an unstable model), the rest is NaN.
+    If the simulation diverges, the rest is NaN.
     """
     changed = with_values(robot, variant.robot_values)
     return _along(changed, logs, threads, effects=variant.effects)
@@ -35,7 +35,10 @@ def simulated_torques(
 def simulated_positions(
     robot: Robot, variant: Variant, logs: Sequence[Log], *, threads: int = 0
 ) -> list[Array]:
-    """Return the same of the motor positions (n, n_axes) [rad]; the variant may change gains."""
+    """Return the motor positions (n, n_axes) [rad] of a simulator along the references of each log.
+
+    If the simulation diverges, the rest is NaN. The variant may change gains.
+    """
     changed = with_values(robot, variant.robot_values)
     return _along(changed, logs, threads, effects=variant.effects, signal="position_rad")
 
@@ -56,7 +59,7 @@ def _along(
     noise: Sequence[Array] | None = None,
     signal: str = "torque_cmd_nm",
 ) -> list[Array]:
-    """Return a signal along the references of logs, which may differ in length."""
+    """Return one signal of the runs along logs of any lengths, (n, n_axes) each, without their run-ups."""
     values = _runs(robot, logs, threads, effects, noise)[signal].values
     return [values[i, log.lead : log.lead + log.n_samples] for i, log in enumerate(logs)]
 
@@ -68,7 +71,7 @@ def _runs(
     effects: Sequence[Effect],
     noise: Sequence[Array] | None = None,
 ) -> xr.Dataset:
-    """Return all signals along the references of logs, one run for each, what leads to them first."""
+    """Return all signals of one run along the references of each log, with its run-up first."""
     return simulate_batch(
         robot,
         _padded([_reference(log) for log in logs]),
@@ -81,7 +84,7 @@ def _runs(
 
 
 def _padded(rows: Sequence[Array]) -> Array:
-    """Stack arrays (n, n_axes), zeros after the end of the shorter ones."""
+    """Stack arrays (n, n_axes), the shorter ones with zeros at the end."""
     longest = max(len(row) for row in rows)
     return np.stack([np.pad(row, ((0, longest - len(row)), (0, 0))) for row in rows])
 
@@ -104,7 +107,8 @@ def noise_torques(
 ) -> list[Array]:
     """Return the torque (n, n_axes) [Nm] that position noise alone causes along each log.
 
-    ``step_rad`` (n_axes,): what positions with the noise are rounded to, zero where they are not.
+    ``std_rad`` (n_axes,): of the noise; ``step_rad`` (n_axes,): encoder steps to which noisy positions are
+    rounded, zero for none.
     """
     noise = [
         white_noise(seed, first_run + i, log.lead + log.n_samples, robot.n_axes) * std_rad
@@ -115,7 +119,7 @@ def noise_torques(
         clean = _along(robot, logs, threads)
         noisy = _along(robot, logs, threads, effects=steps, noise=noise)
         return [np.asarray(b - a) for a, b in zip(clean, noisy, strict=True)]
-    # With noise and without in one batch: they run in lock-step.
+    # One batch for runs with and without noise, so that both take the same steps.
     both = [np.zeros_like(x) for x in noise] + noise
     torques = _along(robot, [*logs, *logs], threads, noise=both)
     clean, noisy = torques[: len(logs)], torques[len(logs) :]

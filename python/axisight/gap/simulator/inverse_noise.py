@@ -1,4 +1,4 @@
-"""What sensor noise alone leaves of a torque predicted from the measured motion."""
+"""Error of a torque predicted from measured motion that sensor noise alone causes."""
 
 from __future__ import annotations
 
@@ -23,11 +23,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class InverseNoise:
-    """Noise of position (or measured velocity) through the inertia, and of the torque.
+    """Noise of position, or measured velocity, through the inertia, and noise of the torque.
 
-    ``robot`` without effects; ``position_std_rad`` (n_axes,) of white noise
-    in each sample: that of velocity and torque is each log's own. ``scale`` (n_axes,): factor that
-    makes of it what repeats of a motion differ by, where there are any (``repeated``).
+    - ``robot``: without effects.
+    - ``position_std_rad`` (n_axes,): white noise in each sample. Noise of velocity and torque is estimated from
+      each log.
+    - ``scale`` (n_axes,): factor that makes the noise as large as the difference between repeated motions.
+    - ``repeated``: whether there are any; else ``scale`` is one.
     """
 
     filtering: Filtering
@@ -39,7 +41,7 @@ class InverseNoise:
 
     @classmethod
     def of(cls, robot: Robot, logs: Sequence[Log], filtering: Filtering, seed: int) -> InverseNoise:
-        """Return the noise of logs, from what is in their spectra where motion has no power."""
+        """Return the noise of logs, from the part of their spectra where motion has no power."""
         std = position_noise_std(list(logs))
         noise = cls(filtering, robot.with_effects([]), std, np.ones(robot.n_axes), seed)
         repeated = repeated_std_nm(logs, filtering)
@@ -50,7 +52,7 @@ class InverseNoise:
         return replace(noise, scale=scale, repeated=True)
 
     def error(self, log: Log, run: int) -> Array:
-        """Return the error (n, n_axes) [Nm] that noise causes in a predicted torque of run ``run``."""
+        """Return the error (n, n_axes) [Nm] that noise causes in a predicted torque; ``run`` seeds the noise."""
         step = log.sample_time_s
         cutoff = self.filtering.motion_cutoff_hz(step)
         white = white_noise(self.seed, 2 * run, log.n_samples, log.n_axes)
@@ -66,7 +68,7 @@ class InverseNoise:
         return np.asarray(self.scale * self.filtering.compared(left, step))
 
     def _inertial(self, log: Log, acceleration: Array) -> Array:
-        """Return the torque of an acceleration added to that of a log (n, n_axes), `M(q)` times it."""
+        """Return the torque (n, n_axes) [Nm] of an acceleration added to that of a log: the mass matrix times it."""
         position, velocity, own, torque = self.filtering(log)
         with_it, without = (
             predicted_torque(self.robot, AS_GIVEN, (position, velocity, a, torque))
@@ -78,8 +80,8 @@ class InverseNoise:
 def _top_std(log: Log, x: Array) -> Array:
     """Return the standard deviation of white noise (n_axes,) from the top fifth of the spectrum.
 
-    Dry friction breaks a torque at every reversal, which shows up there too: not more than what the
-    differences from one sample to the next have without the largest of them.
+    Dry friction breaks a torque at every reversal, which adds power there. The estimate is therefore limited to
+    that from sample-to-sample differences without the largest ones.
     """
     rate = 1.0 / log.sample_time_s
     f, density = scipy.signal.welch(x, rate, nperseg=segment_of(log), axis=0)
@@ -88,14 +90,14 @@ def _top_std(log: Log, x: Array) -> Array:
     return np.asarray(np.minimum(found, _unbroken_std(x)))
 
 
-# Of the differences of a signal, counted without those that breaks make.
+# Share of the smallest squared differences that is averaged; the rest may contain breaks.
 _KEPT = 0.9
-# Of normal numbers, the variance of the smallest nine tenths; squares of third differences, of white noise.
+# Mean square of the smallest 90 % of standard normal numbers, and of third differences of unit white noise.
 _VARIANCE_KEPT, _THIRD = 0.6230, 20.0
 
 
 def _unbroken_std(x: Array) -> Array:
-    """Return the standard deviation of white noise (n_axes,) from the third differences of a signal."""
+    """Return the standard deviation of white noise (n_axes,) from the smaller third differences of a signal."""
     squares = np.sort(np.diff(x, 3, axis=0) ** 2, axis=0)
     kept = squares[: max(1, int(_KEPT * len(squares)))].mean(axis=0)
     return np.asarray(np.sqrt(kept / (_VARIANCE_KEPT * _THIRD)))

@@ -1,7 +1,7 @@
-"""How much of an effect is a lot on this robot: natural sizes of its amplitudes, by their units.
+"""Natural sizes of effects on a robot: how large an amplitude must be to be large there, by its unit.
 
-The table of effects states sizes of large robots. On a small one a friction that large would throw
-the simulator off any log, and no derivative would tell what a little of it does.
+The table of effects states sizes for large robots. On a small robot, such a friction would throw the simulator
+off any log, and a derivative with that step would be useless.
 """
 
 from __future__ import annotations
@@ -16,18 +16,19 @@ from axisight.effects import Effect, effect_info
 from axisight.logs import Log
 from axisight.robot import Robot
 
-# Of the torque, the inertia or the mass that is there, as production scatter is of parameters. In quiet logs of
-# slow motions a quarter of a small torque is a thousand times the noise, and would count as chaos.
+# Natural size, as a share of the torque, inertia or mass of an axis, like the production scatter of parameters.
+# With 25 %, a small torque in quiet logs of slow motions is 1000 times the noise, and would count as chaos.
 _SHARE = 0.02
-# Samples over which a speed is taken: noise of the angle is none.
+# Samples between the two angles of a speed, so many that their noise does not matter.
 _APART = 20
 
 
 @dataclass(frozen=True)
 class AxisSizes:
-    """What is large on an axis: torque [Nm] and speed [rad/s] of its motor in the logs, its robot's values.
+    """Reference sizes of an axis: torque [Nm] and speed [rad/s] of its motor in the logs, and values of its robot.
 
-    ``stiffness`` is None where the gear does not give way.
+    ``ratio``: joint angle per motor angle; ``stiffness`` [Nm/rad, joint side], None for a rigid gear;
+    ``motor_inertia`` [kg m^2]; ``last_kg``: mass of the last link [kg].
     """
 
     torque_nm: float
@@ -39,11 +40,11 @@ class AxisSizes:
 
     @property
     def deflection_rad(self) -> float:
-        """Of the gear, by the torque."""
+        """Deflection of the gear under the torque [rad, joint side]."""
         return np.inf if self.stiffness is None else self.torque_nm / self.ratio / self.stiffness
 
 
-# What is a lot on an axis, by the unit of an amplitude.
+# Reference size of an amplitude on an axis, by its unit.
 _BY_UNIT: Mapping[str, Callable[[AxisSizes], float]] = {
     "Nm": lambda a: a.torque_nm,
     "Nm s/rad": lambda a: a.torque_nm / a.speed_rad_s,
@@ -59,18 +60,18 @@ _BY_UNIT: Mapping[str, Callable[[AxisSizes], float]] = {
 
 
 class NaturalSizes:
-    """Natural sizes of amplitudes on a robot that moves as in logs."""
+    """Natural sizes of amplitudes on a robot that moves as in its logs."""
 
     def __init__(self, robot: Robot, logs: Sequence[Log]) -> None:
         self.robot, self.logs = robot, logs
 
     @cached_property
     def axes(self) -> list[AxisSizes]:
-        """What is large on every axis."""
+        """The reference sizes of every axis."""
         return [self._axis(place) for place in range(self.robot.n_axes)]
 
     def of(self, effect: Effect, name: str) -> float:
-        """Return the natural size of a parameter of an effect: never more than the table states."""
+        """Return the natural size of a parameter of an effect, at most the size in the table of effects."""
         info = effect_info(effect.name)
         parameter = next(p for p in info.parameters if p.name == name)
         of = _BY_UNIT.get(parameter.unit)
@@ -78,7 +79,7 @@ class NaturalSizes:
             of = _of_gear
         if of is None or parameter.role != "amplitude":
             return parameter.typical
-        # What acts on the arm is felt where least moves, too.
+        # An effect on the whole arm takes the smallest size of all axes.
         axes = [a for i, a in enumerate(self.axes, 1) if effect.acts_on(i)]
         most = _SHARE * min(of(a) for a in axes)
         return min(parameter.typical, most) if most > 0 else parameter.typical
@@ -101,7 +102,7 @@ def _of_gear(a: AxisSizes) -> float:
 
 
 def _top_speed(log: Log, place: int) -> float:
-    """Return the top speed of a motor [rad/s], not zero."""
+    """Return the top speed of a motor [rad/s], never zero."""
     angle = log.position_rad[:, place]
     apart = min(_APART, len(angle) - 1)
     moved = np.abs(angle[apart:] - angle[:-apart]).max()

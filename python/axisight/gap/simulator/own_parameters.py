@@ -1,8 +1,8 @@
-"""The simulator's own parameters that are none of a robot: the core knows them as parameters of effects.
+"""Own parameters of the simulator that the core has as parameters of effects.
 
-Torque constants that nobody knows, and gains of a controller of targets with a tolerance. A fit has them in
-effects that every model has, behind those it tries; they go by names as parameters do (``j1.torque_constant``,
-``j1.kp``), their values relative changes.
+These are unknown torque constants, and gains of a controller of targets with a tolerance. A fit puts them into
+effects of every model, after the effects that it tries. They have names like other parameters
+(``j1.torque_constant``, ``j1.kp``); their values are relative changes.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from axisight.gap.simulator.tolerances import tolerance_of
 from axisight.robot import Robot
 
 UNKNOWN = 1.0
-"""Tolerance of a constant that nobody knows, relative [1]: one standard deviation is a factor of two."""
-# Effects of the core that stand for parameters of the simulator, and their parameters.
+"""Relative tolerance of an unknown torque constant [1]: one standard deviation is a factor of two."""
+# Effects of the core that hold own parameters of the simulator, and the parameters of these effects.
 _CONSTANT = TORQUE_CONSTANT[0]
 _FIRST, _SECOND = OTHER_GAINS[1]
-# Parameter of the effect of other gains by gain, of the controllers whose gains may have a tolerance.
+# Parameter of the effect *other gains* for each gain, of the controllers whose gains may have a tolerance.
 _OF_GAINS: Mapping[str, Mapping[str, str]] = {
     "pd_position": {"kp": _FIRST, "kd": _SECOND},
     "cascade_position": {"kv": GAIN_OF_POSITION[1], "kp": _FIRST, "ki": _SECOND},
 }
-# Of a constant that nobody knows, an error of the torque sensor is part.
+# Effects that are a part of another one: the error of a torque sensor is part of an unknown torque constant.
 _PARTS = {_CONSTANT: (TORQUE_SENSOR[0],)}
 
 
 @dataclass(frozen=True)
 class _Place:
-    """The parameter of an effect on an axis (from 1) that a name stands for."""
+    """The parameter of an effect on an axis (from 1) that an own parameter is in the core."""
 
     effect: str
     axis: int
@@ -45,18 +45,18 @@ class _Place:
         return Effect(self.effect, self.axis).label
 
     def stated(self, robot: Robot) -> float:
-        """Return what a robot states of it itself, zero if nothing."""
+        """Return the value in the effects that the robot itself states; zero without one."""
         own = next((e for e in robot.effects if e.label == self.label), None)
         return 0.0 if own is None else (own.parameters or {}).get(self.parameter, 0.0)
 
 
 def _places(robot: Robot) -> dict[str, _Place]:
-    """Return by name what may be a parameter of the simulator in an effect."""
+    """Return, by name, all own parameters that the core has in effects."""
     gains, parameters = robot.controller_gains, _OF_GAINS.get(robot.controller_kind, {})
     out = {}
     for axis, joint in zip(robot.axis_numbers(), robot.axis_names, strict=True):
         out[f"{joint}.{_CONSTANT}"] = _Place(TORQUE_CONSTANT[0], axis, TORQUE_CONSTANT[1])
-        # A gain of none has no share by which it changes: a speed loop may have no integral.
+        # A gain of zero has no relative change; a speed loop may have no integral gain.
         for gain in (gain for gain in parameters if gains[gain][axis - 1] > 0):
             out[f"{joint}.{gain}"] = _Place(OTHER_GAINS[0], axis, parameters[gain])
     return out
@@ -68,22 +68,22 @@ def constant_name(robot: Robot, axis: int) -> str:
 
 
 def gain_names(robot: Robot) -> list[str]:
-    """Return the names of the gains of a controller of targets; none of others."""
+    """Return the names of the gains of a controller of targets; empty for other controllers."""
     return [name for name, place in _places(robot).items() if place.effect == OTHER_GAINS[0]]
 
 
 def gain_quantities(robot: Robot) -> list[str]:
-    """Return which gains of a controller of targets may have a tolerance (``kp``); none of others."""
+    """Return the gains (``kp``) of a controller of targets that may have a tolerance; empty for other controllers."""
     return list(dict.fromkeys(name.rsplit(".", 1)[1] for name in gain_names(robot)))
 
 
 def nominal_values(robot: Robot) -> dict[str, float]:
-    """Return the values of a robot by name: of its parameters, and of gains, which have not changed."""
+    """Return the values of a robot's parameters, and zero for its gains, by name."""
     return {**robot_parameters(robot), **dict.fromkeys(gain_names(robot), 0.0)}
 
 
 def nominal_and_size(robot: Robot, name: str) -> tuple[float, float]:
-    """Return the value that a robot has of a parameter by name, and what its changes are relative to."""
+    """Return the nominal value of a parameter by name, and the size that its changes are relative to."""
     place = _places(robot).get(name)
     if place is None:
         value = robot_parameters(robot)[name]
@@ -92,15 +92,15 @@ def nominal_and_size(robot: Robot, name: str) -> tuple[float, float]:
 
 
 def unknown_constants(robot: Robot, axes: Sequence[int]) -> list[Parameter]:
-    """Return the torque constants of ``axes`` (from 1), which nobody knows, as what a fit moves."""
+    """Return the unknown torque constants of ``axes`` (from 1) as parameters of a fit."""
     return [_uncertain(robot, constant_name(robot, axis), UNKNOWN) for axis in axes]
 
 
 def uncertain_gains(robot: Robot, tolerances: Mapping[str, float]) -> list[Parameter]:
-    """Return the gains that have a tolerance, as what a fit moves.
+    """Return the gains that have a tolerance as parameters of a fit.
 
-    Raises InputError for a tolerance that is not positive, and where the robot states other gains itself,
-    in an effect.
+    Raises InputError for a tolerance that is not positive, and for a robot that also states other gains as an
+    effect.
     """
     known = {name: tolerance_of(tolerances, name) for name in gain_names(robot)}
     out = [
@@ -117,7 +117,7 @@ def uncertain_gains(robot: Robot, tolerances: Mapping[str, float]) -> list[Param
 
 
 def _uncertain(robot: Robot, name: str, tolerance: float) -> Parameter:
-    """Return a parameter in an effect, within a relative tolerance of what the robot states."""
+    """Return an own parameter for a fit; its prior is the stated value with the relative tolerance."""
     place, (mean, size) = _places(robot)[name], nominal_and_size(robot, name)
     effect = Effect(place.effect, place.axis, {place.parameter: mean})
     known, spread = effect_parameter([effect], 0, place.parameter), tolerance * size
@@ -133,7 +133,7 @@ def _uncertain(robot: Robot, name: str, tolerance: float) -> Parameter:
 
 
 def absorbed(robot: Robot, parameters: Sequence[Parameter]) -> frozenset[str]:
-    """Return the labels of effects that are no causes beside parameters that hold them."""
+    """Return the labels of effects that cannot be causes, since these own parameters contain them."""
     places = [place for p in parameters if (place := _places(robot).get(p.name)) is not None]
     return frozenset(
         Effect(effect, place.axis).label
@@ -143,7 +143,7 @@ def absorbed(robot: Robot, parameters: Sequence[Parameter]) -> frozenset[str]:
 
 
 def split(robot: Robot, values: Mapping[str, float]) -> tuple[dict[str, float], list[Effect]]:
-    """Return the values of a robot's parameters, and the effects that the others among them are."""
+    """Return the values of a robot's parameters, and the effects that hold the other own parameters."""
     places = _places(robot)
     own: dict[tuple[str, int], dict[str, float]] = {}
     for name, place in places.items():
@@ -154,7 +154,7 @@ def split(robot: Robot, values: Mapping[str, float]) -> tuple[dict[str, float], 
 
 
 def with_values(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """Return a robot with its own parameters as they were fitted, in effects or not."""
+    """Return a robot with fitted values of its own parameters, in effects or not."""
     plain, own = split(robot, values)
     changed = robot.with_parameters(plain)
     if not own:
@@ -166,7 +166,7 @@ def with_values(robot: Robot, values: Mapping[str, float]) -> Robot:
 def for_core(
     robot: Robot, effects: Sequence[Effect], parameters: Sequence[Parameter]
 ) -> tuple[list[Effect], list[Parameter]]:
-    """Return effects and parameters as the core knows them: those in effects behind the others."""
+    """Return effects and parameters as the core expects them, the effects of own parameters last."""
     places = _places(robot)
     _, own = split(robot, {p.name: p.initial for p in parameters if p.effect is None})
     at = {effect.label: i for i, effect in enumerate(own, start=len(effects))}

@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 
 
 def predicted_torque(robot: Robot, variant: Variant, at: Motion) -> Array:
-    """Return the torque (n, n_axes) [Nm] a simulator predicts for a motion."""
+    """Return the torque (n, n_axes) [Nm] that a simulator predicts for a motion."""
     changed = with_values(robot, variant.robot_values)
     record = (*at, np.ones_like(at[3]))
     motions = _core.MeasuredMotions(changed.core, [record], Weighting.flat(robot.n_axes).core())
     result = motions.evaluate(core_effects(variant.effects), [], FitOptions())
-    # The residual is prediction minus measurement, axis by axis.
+    # The residual is prediction minus measurement, by axis.
     residual = must_hold(result).residual.reshape(robot.n_axes, -1).T
     return np.asarray(residual + at[3])

@@ -1,4 +1,4 @@
-"""Where runs begin: each at its own pose, where logs of one robot begin at several."""
+"""The pose where each simulation starts, if logs of one robot start at different poses."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Joint angle between starts that changes gravity by a few per cent; a tenth of it is elastic
-# deflection under another load.
+# Distance between start angles that counts as another pose [rad, joint side]. It changes gravity by a few per
+# cent; elastic deflection under another load is a tenth of it.
 OFFSET_RAD = 0.02
-# Deflections under gravity change little with the pose: each step leaves a hundredth of the error.
+# Iterations for the start angle. Gravity deflection changes little with the pose: each step leaves 1 % of the
+# error.
 _STEPS = 3
 SAYS = (
     "the logs begin at different poses: each is simulated from its own, where its first position is"
@@ -24,14 +25,14 @@ SAYS = (
 
 
 def at_their_poses(robot: Robot, logs: Sequence[Log]) -> list[Log]:
-    """Return logs with the angles that a simulation of each starts at, where they begin at several poses.
+    """Return logs with the joint angles where their simulations start, if they start at different poses.
 
-    Logs that all begin at one pose are returned as they are: beside the operating point that is a
-    finding; so are those of a robot without a controller, which is not simulated along them. Positions
-    are those of motors at rest. One with a run-up has its own.
+    Motors count as at rest at the first sample. Logs stay unchanged if all start at one pose (away from the
+    operating point, that is a finding of the gate), or if the robot has no controller and is not simulated
+    along them. A log with a run-up keeps the start that this has.
     """
     if robot.controller_kind == "none" or any(log.n_axes != robot.n_axes for log in logs):
-        # Logs of another robot are refused, by name, where all faults are looked for.
+        # The gate refuses logs of another robot by name.
         return list(logs)
     begins = np.array([log.position_rad[0] for log in logs if log.run_up is None])
     apart = np.ptp(begins, axis=0) * np.abs(robot.gear_ratio) if len(begins) else np.zeros(1)
@@ -46,9 +47,9 @@ def at_their_poses(robot: Robot, logs: Sequence[Log]) -> list[Log]:
 
 
 def start_of(robot: Robot, position_rad: Array) -> Array:
-    """Return the driven joint angles [rad] at which the motors of a robot at rest are at ``position_rad``.
+    """Return the driven joint angles [rad] that put the motors of a robot at rest at ``position_rad``, (n_axes,) each.
 
-    Both (n_axes,). Raises InputError where the arm does not settle.
+    Raises InputError if the arm does not settle.
     """
     angle = np.array(robot.operating_point, float)
     for _ in range(_STEPS):
@@ -58,7 +59,7 @@ def start_of(robot: Robot, position_rad: Array) -> Array:
 
 
 def starts_of(robot: Robot, logs: Sequence[Log]) -> list[list[float]] | None:
-    """Return where simulations of logs start [rad], (n_logs, n_axes); None where all do at the operating point."""
+    """Return the start angles of the simulations (n_logs, n_axes) [rad]; None if all start at the operating point."""
     if all(log.start_rad is None for log in logs):
         return None
     rest = robot.operating_point

@@ -1,4 +1,4 @@
-"""How far the simulator's own parameters may be off: by quantity, or by name from an identification."""
+"""Tolerances of the simulator's own parameters, by quantity, or by name from an identification."""
 
 from __future__ import annotations
 
@@ -17,20 +17,17 @@ from axisight.robot import Robot, load_robot
 from axisight.robot_file import load_identified
 from axisight.robot_file.sidecar import sidecar_path
 
-# Robot files state values to as many digits.
+# Relative difference up to which a value counts as unchanged; robot files state so many digits.
 _SAME = 1e-6
 
 
 def tolerance_of(tolerances: Mapping[str, float], name: str) -> float | None:
-    """Return the relative tolerance [1] of a parameter, its own before that of its quantity.
-
-    None: it is taken as exact.
-    """
+    """Return the relative tolerance [1] of a parameter, by its name, else by its quantity; None if it is exact."""
     return tolerances.get(name, tolerances.get(name.rsplit(".", 1)[1]))
 
 
 def spring_changes(effect: Effect) -> tuple[float, ...]:
-    """Return by what shares of its stiffness [1] a law makes a gear another spring; none of others."""
+    """Return the relative changes of stiffness [1] that an effect makes as another spring; empty for other effects."""
     info = effect_info(effect.name)
     values = dict(zip((p.name for p in info.parameters), effect.values(), strict=True))
     sums = () if info.spring is None else info.spring.sums
@@ -45,11 +42,10 @@ def with_tolerances(
 ) -> Settings:
     """Return settings with all tolerances of a robot.
 
-    The defaults, then what its file states, what an identification beside the file says of single
-    parameters, and what is ``given``, each before the one before.
+    Later sources replace earlier ones: defaults, the robot file, an identification beside it, and ``given``.
     """
     known = identified_tolerances(robot_file, settings.model_error)
-    # One given for a quantity is meant for all parameters of it.
+    # A given tolerance of a quantity holds for all parameters of that quantity.
     known = {n: t for n, t in known.items() if n.rsplit(".", 1)[1] not in given}
     return replace(settings, tolerances={**settings.tolerances_of(robot), **known, **given})
 
@@ -57,9 +53,9 @@ def with_tolerances(
 def loaded(
     source: Robot | Path | str, settings: Settings, sample_time_s: float
 ) -> tuple[Robot, Settings]:
-    """Return the simulator and settings with the tolerances that stand in and beside its file.
+    """Return the simulator, and settings with the tolerances in and beside its file.
 
-    ``sample_time_s``: of a model file that states none.
+    ``sample_time_s``: for a model file that states none.
     """
     if isinstance(source, Robot):
         return source, settings
@@ -70,12 +66,11 @@ def loaded(
 
 
 def identified_tolerances(robot_file: Path | str, model_error: float) -> dict[str, float]:
-    """Return relative tolerances by name from the identification beside a robot file.
+    """Return relative tolerances by name from the identification beside a robot file; empty without one.
 
-    Standard errors know of noise and not of the errors of formulas: ``model_error``, the relative
-    error of a perfect simulator, is added in squares. They belong to the values that were
-    identified: one that was changed in the file since is left out. Empty where there is no
-    identification, or for a preset. Raises InputError for one that cannot be read.
+    Standard errors contain noise but no formula error. So ``model_error``, the relative error of a perfect
+    simulator, is added in squares. A value that was changed in the robot file after the identification is left
+    out, and so are presets. Raises InputError for an identification that cannot be read.
     """
     path = sidecar_path(robot_file)
     if not path.is_file():
