@@ -1,1 +1,1 @@
-"""Logs made ready for a comparison: the part that is used, start, currents, references, targets."""
+"""Prepares logs for a comparison: the part used, the start, currents, references and targets."""

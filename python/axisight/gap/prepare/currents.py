@@ -1,4 +1,4 @@
-"""Currents whose torque constant nobody knows: they become torques by a nominal one."""
+"""Turns currents with an unknown torque constant into torques, by a nominal constant."""
 
 from __future__ import annotations
 
@@ -23,29 +23,35 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Below which most arms are rigid.
+# Cutoff [Hz] below which most arms are rigid.
 _RIGID_HZ = 5.0
-# Of the largest speed, within which dry friction turns round.
+# Speed where the smoothed sign of dry friction turns, as a share of the largest speed.
 _TURNS = 0.02
-# Standard errors from which a torque shows in a current: by less the constant would be known to no third.
+# Standard errors that the share of torque in a current must exceed. With fewer, the constant's error is over
+# 1/3.
 _SURE = 3.0
-# A controller's law that explains less of a current, or whose two shares differ by more, is not that of the machine.
+# Smallest share of a current that the controller's law must explain, and largest relative difference between
+# the factors of its two parts. Otherwise the machine has another controller.
 _EXPLAINED, _SAME = 0.9, 0.1
-# By how much a sample time may be off and still be that of the controller; and where the upper part of a band begins.
+# Largest relative difference between the sample times of a log and of the controller; and start of the upper
+# part of the band, as a share of the Nyquist frequency.
 _SAME_CLOCK = 1e-3
 _UPPER = 0.8
 
 
 @dataclass(frozen=True)
 class Nominal:
-    """The constant [Nm/A] by which currents of an axis (from 1) were read, and where it comes from."""
+    """The constant [Nm/A] with which currents of an axis (from 1) were read, and its source."""
 
     axis: int
     nm_per_a: float
     source: str
 
     def finding(self, change: Interval | None = None) -> Finding:
-        """Return what is to be said of it; ``change``: by what share of it [1] the fit found the constant off."""
+        """Return the finding about an unknown constant.
+
+        ``change``: relative change [1] of the nominal constant that the fit found; None before a fit.
+        """
         said = f"expected a torque constant, got none: currents were read with {self.nm_per_a:.4g} Nm/A ({self.source})"
         if change is None:
             said += ". A diagnosis fits the constant; a factor of two from this value is no cause"
@@ -62,7 +68,7 @@ class Nominal:
 
 @dataclass(frozen=True)
 class Read:
-    """Logs in torques, and the nominal constants by which they are."""
+    """Logs with torques instead of currents, and the nominal constants."""
 
     estimation: list[Log]
     validation: list[Log]
@@ -70,12 +76,15 @@ class Read:
 
 
 def in_torques(robot: Robot, estimation: Sequence[Log], validation: Sequence[Log]) -> Read:
-    """Return logs with torques in the place of currents whose constant nobody knows.
+    """Return logs with torques instead of currents whose torque constant is unknown.
 
-    Of each such axis the nominal constant is that by which the currents are what the controller commands, where
-    logs show it; else the rated one, where the reading of logs had it; else that by which the
-    estimation logs have the torque that the robot predicts, beside friction. Raises InputError where logs differ
-    in what is unknown, or a current says nothing.
+    The nominal constant of an axis comes from the first of these sources that is available:
+
+    - the controller's law, if it gives the current up to a factor;
+    - the rated constant in the drive data;
+    - the torque that the robot predicts beside friction, in the estimation logs.
+
+    Raises InputError if the logs differ in their unknown axes, or if a current shows no torque of masses.
     """
     axes = unknown_axes(estimation)
     if any(unknown_axes([log]) != axes for log in [*estimation, *validation]):
@@ -87,7 +96,7 @@ def in_torques(robot: Robot, estimation: Sequence[Log], validation: Sequence[Log
 
 
 def unknown_axes(logs: Sequence[Log]) -> list[int]:
-    """Return the axes (from 1) of which nobody knows the torque constant."""
+    """Return the axes (from 1) with an unknown torque constant."""
     return sorted(
         {i for log in logs for i, x in enumerate(log.nominal_nm_a, start=1) if x is not None}
     )
@@ -97,7 +106,7 @@ def _read(log: Log, nominal: Sequence[Nominal]) -> Log:
     factor, stated = np.ones(log.n_axes), list(log.nominal_nm_a)
     for one in nominal:
         read_by = stated[one.axis - 1]
-        assert read_by is not None  # it is one of the unknown axes
+        assert read_by is not None  # only unknown axes have a nominal constant
         factor[one.axis - 1] = one.nm_per_a / (read_by if np.isfinite(read_by) else 1.0)
         stated[one.axis - 1] = one.nm_per_a
     if not nominal:
@@ -120,7 +129,7 @@ def _nominal(robot: Robot, logs: Sequence[Log], axis: int) -> Nominal:
 
 
 def _by_the_law(robot: Robot, logs: Sequence[Log], axis: int) -> float | None:
-    """Return by what a torque has to be multiplied to be what the controller commands; None where it is not."""
+    """Return the factor that makes the logged torque the controller's command; None if no factor does."""
     if not robot.told_speeds:
         return None
     if not is_closed_loop(robot, logs):
@@ -136,10 +145,10 @@ def _by_the_law(robot: Robot, logs: Sequence[Log], axis: int) -> float | None:
 
 
 def _by_the_noise(robot: Robot, logs: Sequence[Log], axis: int) -> float | None:
-    """Return the same of logs without references, by what the controller makes of the noise of positions.
+    """Return this factor for logs without references, from the controller's response to position noise.
 
-    In the upper part of the band there is no reference, and none that could be recovered from a torque that
-    is off by a few per cent.
+    Only the upper part of the band is used. It holds no reference motion, and none can be reconstructed from a
+    torque with an error of a few per cent.
     """
     if any(abs(log.sample_time_s / robot.sample_time_s - 1) > _SAME_CLOCK for log in logs):
         return None
@@ -161,11 +170,11 @@ def _upper(x: Array) -> NDArray[np.complex128]:
 
 
 def _by_the_robot(robot: Robot, logs: Sequence[Log], axis: int) -> float:
-    """Return the constant by which logs have the torque that the robot predicts.
+    """Return the constant with which the logs have the torque that the robot predicts.
 
-    By regression of the current on this torque, with friction and a constant beside it, which are most of what
-    some motors give. A current of the other sign stays one, for the gate to see. Raises InputError where it is
-    friction alone, as far as the logs tell.
+    The current is regressed on this torque, beside friction and an offset, which are most of the current of
+    some motors. The constant is positive: the gate has to see a current of the wrong sign. Raises InputError if
+    the current is friction alone within its error.
     """
     cutoff = min(_RIGID_HZ, highest_cutoff_hz(logs[0].sample_time_s))
     motions = [motion(log, cutoff) for log in logs]
@@ -178,7 +187,7 @@ def _by_the_robot(robot: Robot, logs: Sequence[Log], axis: int) -> float:
     )
     torque, current = (x - friction @ (friction.T @ x) for x in (torque, current))
     size, share = float(torque @ torque), float(torque @ current)
-    # Below the cutoff samples repeat one another.
+    # Below the cutoff, neighbouring samples are not independent.
     independent = 2 * cutoff * sum(log.duration_s for log in logs)
     left = float(current @ current) - share**2 / max(size, 1e-300)
     if not share**2 > _SURE**2 * max(left, 0.0) * size / independent:

@@ -1,9 +1,9 @@
-"""The state that a simulation is in where a log begins, fitted to what it does next.
+"""Fits the state in which a simulation enters a log to the start of that log.
 
-A run-up brings a simulation to the position and speed of a log's first motion. What swings there (arms on
-their gears, the loop itself) depends on what drove the machine before. References of the run-up
-are changed so that the simulated torque is that of the log for as long as it remembers: the initial state as
-free numbers, by what can make it.
+A run-up brings a simulation to the position and speed at the start of a log. Oscillations there, of arms on
+their gears or of the loop, depend on how the machine was driven before. So the references of the run-up are
+changed until the simulated torque matches the log, for as long as the loop remembers its start. These changes
+stand in for a free initial state.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from axisight.simulation import simulate_batch
 
 Array = NDArray[np.float64]
 
-# Changes of an axis' reference: differences of neighbouring cubic B-splines, whose knots are so far apart [s],
-# a sample at least, and which end where the log begins. They make modes up to half the rate of the knots, and
-# move no sum.
+# Distance between the knots of the B-splines [s], one sample at least, and the number of changes of an axis'
+# references. A change is the difference of two neighbouring cubic B-splines that end at the start of the log.
+# Together they excite modes up to half the knots' rate. Each sums to zero.
 _KNOT_S = 0.02
 _SHAPES = 10
 LEAST_SAMPLES = _SHAPES + 4
-"""Samples of a run-up that all changes find room in."""
-# Of the rms of the references, with which each is tried; and of the strongest combination, below which one is
-# left alone.
+"""Smallest number of samples of a run-up that holds all changes."""
+# Size of each change in its trial simulation, as a share of the references' rms. Smallest singular value that
+# is used, as a share of the largest. And number of steps.
 _TRIED = 0.05
 _TOLD = 0.01
 _STEPS = 2
@@ -41,11 +41,12 @@ def with_first_state(
     seconds: float,
     compared: Compared = "torques",
 ) -> Array:
-    """Return references (m, n_axes) [rad/s] before a log that leave least of its first ``seconds``.
+    """Return references (m, n_axes) [rad/s] before a log that fit its first ``seconds`` best.
 
-    Of its torque or, without its mean, its position, as ``compared`` says. Gauss-Newton, by simulations with
-    each change of ``references``, from rest at the joint angles ``start_rad``; what the changes do hardly changes
-    from step to step, and is simulated once. Unchanged where nothing is gained.
+    The fit compares torques, or positions without their mean, as ``compared`` says. It takes Gauss-Newton
+    steps, with simulations of every change of ``references``, from rest at the joint angles ``start_rad``
+    (n_axes,) [rad]. The sensitivities hardly change, and are simulated once. If no step lowers the error,
+    ``references`` are returned.
     """
     n = round(seconds / log.sample_time_s)
 
@@ -69,7 +70,7 @@ def with_first_state(
 
 
 def _moves(log: Log, lead: int) -> Array:
-    """Return changes of ``lead`` references before a log (n_axes * n_shapes, lead, n_axes) [rad/s]."""
+    """Return the changes of ``lead`` references before a log (n_axes * n_shapes, lead, n_axes) [rad/s]."""
     assert log.velocity_ref_rad_s is not None  # closed loop only
     size = _TRIED * np.sqrt(np.mean(log.velocity_ref_rad_s**2, axis=0))
     shapes = _shapes(lead, log.sample_time_s)
@@ -80,7 +81,7 @@ def _moves(log: Log, lead: int) -> Array:
 
 
 def _shapes(lead: int, step_s: float) -> Array:
-    """Return changes (n_shapes, lead) of equal size, up and down, just before a log."""
+    """Return changes (n_shapes, lead) that rise and fall by the same amount just before a log."""
     before_s = step_s * (np.arange(lead) - lead)
     knot_s = max(_KNOT_S, step_s)
     spline = scipy.interpolate.BSpline.basis_element(np.arange(-2.0, 3.0), extrapolate=False)
@@ -91,7 +92,7 @@ def _shapes(lead: int, step_s: float) -> Array:
 def _missed(
     robot: Robot, log: Log, tried: Array, start_rad: Array, n: int, compared: Compared
 ) -> Array:
-    """Return what simulations are off the first ``n`` samples of a log, relative to its rms (n_tried, ...).
+    """Return the errors of simulations in the first ``n`` samples, over the log's standard deviation (n_tried, ...).
 
     ``tried`` (n_tried, lead, n_axes) [rad/s]: references before those of the log.
     """

@@ -1,4 +1,4 @@
-"""How a log begins: at rest, in motion, or so that positions alone do not tell and a simulation does."""
+"""Tells whether a log starts at rest or in motion, from its positions and, if these leave it open, by simulation."""
 
 from __future__ import annotations
 
@@ -17,30 +17,34 @@ from axisight.simulation import simulate
 Array = NDArray[np.float64]
 Begins = Literal["rest", "motion", "open"]
 
-# Samples of the shortest parabola through first positions, and seconds of the longest: loops answer a step of
-# their reference in some milliseconds.
+# Samples of the shortest parabola through the first positions, and duration of the longest [s]: loops respond
+# to a step of their reference within milliseconds.
 _FEWEST = 4
 _LONGEST_S = 0.01
-# Deviations by which noise moves a term of a parabola, and by which it moves positions off one.
+# Standard deviations of noise that a term of a parabola must exceed, and that positions may be off a parabola.
 _NOISES = 6.0
 _OFF = 3.0
-# Share of the largest acceleration below which there is none.
+# Smallest acceleration that counts, as a share of the largest in the log.
 _STEADY = 0.03
-# Share of what a run-up cuts off along which simulations are compared: what is wrong of a beginning fades. Share
-# of the square of what they are apart after which it has, and share of it that tells one from the other.
+# Start of a log where two simulations are compared, as a share of the part that a run-up would cut off: a wrong
+# start fades. Share of the total squared difference of the two after which the comparison ends. And share of
+# the difference that the log must show to start in motion.
 _COMPARED = 0.5
 _FADED = 0.8
 _HALF = 0.5
-# Of the arm's torque, below which there is none on an axis.
+# Smallest noise of a torque, as a share of the arm's largest torque scatter.
 _NOISELESS = 1e-3
 
 
 def begins(log: Log, noise_std: float | Array) -> Begins:
-    """Return how a log begins, by parabolas through ever more of its first positions.
+    """Return whether a log starts at rest or in motion, or whether its first positions leave that open.
 
-    ``noise_std`` of positions, one or (n_axes,) [rad]. In motion: with a speed that its acceleration has not
-    made from rest. Open: with an acceleration, as of a motor that turns round, and of one that a step of its
-    reference starts. A few samples are at rest, for all that they say.
+    Parabolas through ever more of the first positions give speed and acceleration. ``noise_std`` of positions:
+    one, or (n_axes,) [rad].
+
+    - *Motion*: there is a speed that the acceleration cannot have produced from rest.
+    - *Open*: there is an acceleration. Either a motor turns round, or a step of its reference starts it.
+    - *Rest*: neither; also for a log of four samples or fewer.
     """
     if log.n_samples <= _FEWEST:
         return "rest"
@@ -52,7 +56,7 @@ def begins(log: Log, noise_std: float | Array) -> Begins:
 
 
 def _of_first(log: Log, n: int, noise_std: float | Array) -> list[Begins]:
-    """Return how every axis of a log begins, by the parabola through its first ``n`` positions."""
+    """Return how each axis of a log starts, from the parabola through its first ``n`` positions."""
     step, first = log.sample_time_s, log.position_rad[:n]
     powers = np.vander(step * np.arange(n), 3, increasing=True)
     solved = np.linalg.pinv(powers)
@@ -63,7 +67,8 @@ def _of_first(log: Log, n: int, noise_std: float | Array) -> list[Begins]:
     moves = speed > STANDS * top + _NOISES * of_speed * noise_std
     most = _STEADY * _largest_acceleration(log, n)
     turns = acceleration > most + 2 * _NOISES * of_half * noise_std
-    # Of one that begins at rest a parabola has no speed; what is no parabola has begun within it.
+    # A start from rest has a parabola without speed. If positions are off the parabola, the motion began within
+    # it.
     told = np.abs(first - powers @ terms).max(axis=0) < _OFF * noise_std + STANDS * top * step
     sure = moves & told & (speed > 0.5 * acceleration * step * (n - 1))
     return [
@@ -79,10 +84,10 @@ def _largest_acceleration(log: Log, n: int) -> Array:
 
 
 def torque_is_from_rest(robot: Robot, log: Log) -> bool:
-    """Whether a log's first torque is that of a simulation from rest, for all that noise tells.
+    """Whether a log's first torque is that of a simulation from rest, within noise.
 
-    Whatever is missing, what stands has the torque of one that stands, but for what is constant: where that is
-    off too, this does not tell.
+    At rest, missing effects do not change the torque unless they are constant. If the constant torque is off
+    too, the answer is False.
     """
     resting = _from_rest(robot, log, _few(log))
     if resting is None:
@@ -92,15 +97,15 @@ def torque_is_from_rest(robot: Robot, log: Log) -> bool:
 
 
 def run_up_is_better(robot: Robot, log: Log, run_up: Log) -> bool:
-    """Whether a log's torque has what a simulation that is run up to its first motion has beyond one from rest.
+    """Whether the start of a log fits a simulation with a run-up better than one from rest.
 
-    ``run_up``: the log as `axisight.gap.prepare.run_up.run_up_to` returns it; compared is the first half of what
-    that cuts off. What is missing of both simulations says nothing.
+    ``run_up``: the log as returned by `axisight.gap.prepare.run_up.run_up_to`. The first half of the part that
+    it cuts off is compared. Errors that both simulations share do not count.
     """
     cut = log.n_samples - run_up.n_samples
     lead, n = run_up.lead - cut, max(1, round(_COMPARED * cut))
     references = run_up.led("velocity_ref_rad_s")[: lead + n]
-    assert run_up.start_rad is not None  # it has a run-up
+    assert run_up.start_rad is not None  # run_up_to sets both
     moving = _first_torques(robot, references, run_up.start_rad, n)
     resting = _from_rest(robot, log, n)
     if moving is None or resting is None:
@@ -112,21 +117,21 @@ def run_up_is_better(robot: Robot, log: Log, run_up: Log) -> bool:
 
 
 def _few(log: Log) -> int:
-    """Return the samples of a log in which a loop answers a step of its reference."""
+    """Return the number of samples in which a loop responds to a step of its reference."""
     return max(1, round(_LONGEST_S / log.sample_time_s))
 
 
 def _from_rest(robot: Robot, log: Log, n: int) -> Array | None:
-    """Return the first ``n`` torques (n, n_axes) [Nm] of a simulation from rest; None where it is unstable."""
+    """Return the first ``n`` torques (n, n_axes) [Nm] of a simulation from rest; None if it is unstable."""
     assert log.velocity_ref_rad_s is not None  # closed loop only
     at_rest = start_of(robot, log.position_rad[0])
     return _first_torques(robot, log.velocity_ref_rad_s[:n], at_rest, n)
 
 
 def _first_torques(robot: Robot, references: Array, start_rad: Array, n: int) -> Array | None:
-    """Return the last ``n`` torques (n, n_axes) [Nm] of a simulation; None where it is unstable.
+    """Return the last ``n`` torques (n, n_axes) [Nm] of a simulation; None if it is unstable.
 
-    Along references (m, n_axes) [rad/s], from rest at joint angles ``start_rad``.
+    Along references (m, n_axes) [rad/s], from rest at the joint angles ``start_rad`` (n_axes,) [rad].
     """
     run = simulate(robot, references, method="rk4", start_rad=start_rad)
     torque = run["torque_cmd_nm"].values
@@ -134,22 +139,24 @@ def _first_torques(robot: Robot, references: Array, start_rad: Array, n: int) ->
 
 
 def _that_move(log: Log) -> NDArray[np.bool_]:
-    """Return which axes (n_axes,) of a log move."""
+    """Return whether an axis of a log moves (n_axes,)."""
     travel = np.ptp(log.position_rad, axis=0)
     return np.asarray(travel > STANDS * travel.max())
 
 
 def _noise_nm(log: Log) -> Array:
-    """Return the noise of torques (n_axes,) [Nm]; of one that has next to none, a share of the arm's."""
+    """Return the noise of torques (n_axes,) [Nm], at least a small share of the arm's torque."""
     size = log.torque_nm.std(axis=0).max()
     return np.maximum(white_std(log.torque_nm, log.sample_time_s), max(_NOISELESS * size, 1e-300))
 
 
 def _has(missed: Array, apart: Array, least: int) -> bool:
-    """Whether errors have more than half of what two simulations are ``apart``, (n, n_axes) each over noise.
+    """Whether errors contain more than half of the difference between two simulations.
 
-    By least squares beside a constant of each axis, along where they are apart, for that fades; along ``least``
-    samples at least, for what a step of the reference makes is over in one or two.
+    ``missed``: log minus simulation from rest; ``apart``: difference of the simulations; (n, n_axes) each, over
+    noise. The share is a least-squares factor beside a constant for each axis. The comparison ends where the
+    difference has faded, but has ``least`` samples, since the response to a step of the reference lasts one or
+    two.
     """
     square = np.cumsum((apart**2).sum(axis=1))
     n = max(least, int(np.searchsorted(square, _FADED * square[-1])) + 1)

@@ -1,7 +1,7 @@
-"""Logs of positions and their targets alone: brought to the controller's clock, with what it commands.
+"""Adds the controller's commands to logs of positions and targets without torque, at the controller's rate.
 
-A controller of targets is algebra: its command follows from targets and measured positions. Logs are
-often sampled slower than the controller runs, and hold each target until the next one.
+The command of a controller of targets follows from targets and measured positions. Logs are often sampled
+slower than the controller, and hold each target until the next sample.
 """
 
 from __future__ import annotations
@@ -25,21 +25,23 @@ from axisight.robot.robot import TOLD_POSITIONS
 
 Array = NDArray[np.float64]
 
-# By how much a sample time may be off a whole number of the controller's.
+# Largest relative difference between a log's sample time and a whole multiple of the controller's.
 _CLOCK = 0.01
-# Share of the top speed with which a log may begin; noise of speeds besides, so many times over.
+# Largest speed of a start at rest: a share of the top speed, plus so many standard deviations of the speed's
+# noise.
 _AT_REST = 0.02
 _NOISES = 6.0
 
 
 @dataclass(frozen=True)
 class Commanded:
-    """Logs at the rate of the controller, their torque what it commands along them.
+    """Logs at the controller's rate, with its commands as their torque.
 
-    ``robot``: at rest where the logs begin, its controller with the references that they have;
-    ``step``: samples of the controller per sample that was logged; ``short_of_inertia``: axes (from 1)
-    of which the simulator's steps take more inertia than the motor has; ``from_s``: where each log is
-    taken from, not zero of one that begins in motion, which has a run-up.
+    - ``robot``: at rest at the start of the logs; its controller uses the references that the logs have.
+    - ``step``: samples of the controller per logged sample.
+    - ``short_of_inertia``: axes (from 1) where the simulator's integration step takes away more inertia than
+      the motor has.
+    - ``from_s``: first used time of each log [s]; not zero for a log that starts in motion, which has a run-up.
     """
 
     robot: Robot
@@ -53,24 +55,27 @@ class Commanded:
         return [_every(log, self.step) for log in self.logs]
 
     def of(self, logs: Sequence[Log]) -> list[Log]:
-        """Return other logs of the logs' own rate, one for each, as these are."""
+        """Return other logs, one for each and at the logged rate, with commands at the controller's rate."""
         told = [_commanded(self.robot, log, self.step) for log in logs]
         return [replace(log, run_up=own.run_up) for log, own in zip(told, self.logs, strict=True)]
 
     def taken(self, logs: Sequence[Log]) -> list[Log]:
-        """Return other logs, one for each, from where these are taken; as they are where there are not as many."""
+        """Return other logs, one for each, cut at the same first times; unchanged if their number differs."""
         if len(logs) != len(self.from_s):
             return list(logs)
         pairs = zip(logs, self.from_s, strict=True)
         return [log.part(start_s) if start_s else log for log, start_s in pairs]
 
     def findings(self) -> tuple[Finding, ...]:
-        """Return what is to be said of logs that begin in motion."""
+        """Return the findings about logs that start in motion."""
         pairs = zip(self.logs, self.from_s, strict=True)
         return tuple(begins_in_motion(log, start_s) for log, start_s in pairs if start_s)
 
     def along(self, logs: Sequence[Log]) -> Commanded:
-        """Return the same along the positions of other logs at the controller's rate, where they were logged."""
+        """Return these logs along the positions of other logs at the controller's rate.
+
+        Of these, only the logged samples are used. The commands change with the positions.
+        """
         told = []
         for log, other in zip(self.logs, logs, strict=True):
             position = self.fine(other.position_rad[:: self.step])
@@ -84,7 +89,7 @@ class Commanded:
         return replace(self, logs=tuple(told))
 
     def fine(self, values: Array) -> Array:
-        """Return samples (n, n_axes) of the logs' rate at that of the controller, as positions are."""
+        """Return a signal (n, n_axes) of the logs' rate at the controller's rate, by a cubic spline."""
         return between(values, self.step)
 
     def of_error(self, error_rad: Array) -> Array:
@@ -92,16 +97,19 @@ class Commanded:
         return -feedback(self.robot, _speed(self.robot, error_rad), error_rad)
 
     def told_as(self, error_rad: Array) -> Array:
-        """Return the torque (n, n_axes) [Nm] that an error of positions is told as, at the controller's rate."""
+        """Return the torque (n, n_axes) [Nm] as which reports show an error of positions, at the controller's rate."""
         return -told_as_torque(self.robot, _speed(self.robot, error_rad), error_rad)
 
 
 def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
-    """Return logs without torque with what the controller commands along them; None where torque was logged.
+    """Return logs without torque with the controller's commands along them; None if all logs have torque.
 
-    Raises InputError where only some logs have torque, where the robot has no controller of targets or a
-    log no targets, for sample times that are no multiple of the controller's, and for logs that
-    begin in motion and that no simulation can be run up to.
+    Raises InputError in these cases:
+
+    - only some logs have torque;
+    - the robot has no controller of targets, or a log no targets;
+    - a sample time is no multiple of the controller's;
+    - a log starts in motion, and no run-up to it is possible.
     """
     if all(log.has_torque for log in logs):
         return None
@@ -109,7 +117,7 @@ def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
     time = robot.sample_time_s
     step = round(logs[0].sample_time_s / time)
     start = np.mean([log.position_rad[0] for log in logs], axis=0)
-    # Positions alone have rates too, but who follows these by gains alone need not have taken them.
+    # Rates can be computed from targets, but a controller without a logged rate may not use them.
     known = robot.computed_torque or all(x.velocity_ref_rad_s is not None for x in logs)
     known = known or (_is_cascade(robot) and step == 1)
     fed = robot.velocity_feedforward and known
@@ -125,14 +133,14 @@ def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
 
 
 def _is_cascade(robot: Robot) -> bool:
-    """Whether a controller of targets is a cascade, which is fed rates where its robot file says so alone."""
+    """Whether a controller of targets is a cascade, which uses reference rates only if its robot file says so."""
     return "kv" in robot.controller_gains
 
 
 def _from_start(machine: Robot, told: Log, log: Log, step: int) -> Log:
-    """Return a log with commands as it is, or with a run-up where it begins in motion.
+    """Return a log with commands, with a run-up if ``log`` starts in motion.
 
-    Raises InputError for one that no simulation can be run up to.
+    Raises InputError if no run-up is possible.
     """
     moving = _moving(log)
     if not moving.any():
@@ -148,12 +156,12 @@ def _from_start(machine: Robot, told: Log, log: Log, step: int) -> Log:
 
 
 def _as_its_steps_make_it(robot: Robot) -> Robot:
-    """Return a robot with the inertia that a simulator's steps give it; a machine as it is."""
+    """Return a robot with the motor inertia changed by the simulator's integration step; a machine unchanged."""
     if robot.stepped is None:
         return robot
     own, added = robot.parameters(), robot.stepped[1]
     names = [robot.axis_parameter(axis, "motor_inertia") for axis in robot.axis_numbers()]
-    # Explicit damping takes inertia away, the motor's as long as it has any: `short_of_inertia` says where not.
+    # Explicit damping takes inertia away, at most all that the motor has; `short_of_inertia` names such axes.
     changed = {
         name: max(own[name] + float(more), 0.0)
         for name, more in zip(names, added, strict=True)
@@ -163,7 +171,7 @@ def _as_its_steps_make_it(robot: Robot) -> Robot:
 
 
 def short_of_inertia(robot: Robot) -> list[int]:
-    """Return the axes (from 1) of which a simulator's steps take more inertia than the motor has."""
+    """Return the axes (from 1) where a simulator's integration step takes away more inertia than the motor has."""
     if robot.stepped is None:
         return []
     own, out = robot.parameters(), []
@@ -175,9 +183,9 @@ def short_of_inertia(robot: Robot) -> list[int]:
 
 
 def _earlier(target: Array, samples: float) -> Array:
-    """Return targets (n, n_axes) that act so many samples earlier, the last one held.
+    """Return targets (n, n_axes) shifted earlier by a number of samples; the last one is held.
 
-    Within a sample the law gets the mean of what holds there.
+    If a target changes within a sample, the controller gets the mean over the sample.
     """
     whole = int(samples)
     part = samples - whole
@@ -187,7 +195,7 @@ def _earlier(target: Array, samples: float) -> Array:
 
 
 def between(values: Array, step: int) -> Array:
-    """Return samples (n, n_axes) with ``step - 1`` more between any two, by a cubic spline."""
+    """Return a signal (n, n_axes) with ``step - 1`` more samples between any two, by a cubic spline."""
     if step == 1:
         return values
     n = len(values)
@@ -197,13 +205,13 @@ def between(values: Array, step: int) -> Array:
 
 
 def _between_known(velocity: Array | None, step: int) -> Array | None:
-    """Return measured velocities at the controller's rate; None where an axis has none."""
+    """Return measured velocities at the controller's rate; None if an axis has none."""
     known = velocity is not None and bool(np.isfinite(velocity).all())
     return between(velocity, step) if velocity is not None and known else None
 
 
 def _check(robot: Robot, logs: Sequence[Log]) -> None:
-    """Raise InputError naming what keeps a command from following from the logs."""
+    """Raise InputError naming the reason if commands cannot be computed from the logs."""
     for log in logs:
         if log.has_torque:
             others = ", ".join(x.name for x in logs if not x.has_torque)
@@ -233,7 +241,7 @@ def _check(robot: Robot, logs: Sequence[Log]) -> None:
 
 
 def _moving(log: Log) -> NDArray[np.bool_]:
-    """Return which axes (n_axes,) move where a log begins."""
+    """Return whether an axis moves at the start of a log (n_axes,)."""
     speed = np.gradient(log.position_rad, log.sample_time_s, axis=0)
     noise = position_noise_std([log]) / log.sample_time_s
     allowed = _AT_REST * np.abs(speed).max(axis=0) + _NOISES * noise
@@ -241,12 +249,12 @@ def _moving(log: Log) -> NDArray[np.bool_]:
 
 
 def _speed(robot: Robot, angle: Array) -> Array:
-    """Return the speed that a controller takes of angles (n, n_axes): none at the first."""
+    """Return the speed that a controller computes from angles (n, n_axes); zero at the first sample."""
     return np.asarray(np.diff(angle, axis=0, prepend=angle[:1]) / robot.sample_time_s)
 
 
 def _commanded(robot: Robot, log: Log, step: int) -> Log:
-    """Return a log at the controller's rate, with its command."""
+    """Return a log at the controller's rate, with its command as the torque."""
     assert log.position_ref_rad is not None  # checked before
     position = between(log.position_rad, step)
     n, time = len(position), robot.sample_time_s
@@ -277,7 +285,7 @@ def _commanded(robot: Robot, log: Log, step: int) -> Log:
 
 
 def _fed_dynamics(robot: Robot, position: Array, rate: Array) -> Array:
-    """Return what a computed torque commands besides its feedback, from what holds it at first (n, n_axes)."""
+    """Return the command (n, n_axes) of a computed torque without its feedback, relative to the first sample."""
     motors = [position, _speed(robot, position), np.zeros_like(position)]
     if robot.velocity_feedforward:
         motors[2] = np.diff(rate, axis=0, prepend=rate[:1]) / robot.sample_time_s

@@ -1,6 +1,6 @@
-"""References that were not logged: those with which the stated controller commands the logged torque.
+"""Reconstructs references that were not logged, from the logged torque and the stated controller.
 
-Its law is algebra of references, positions and torques: what is missing is found sample by sample.
+The controller's law connects references, positions and torques. So the reference follows sample by sample.
 """
 
 from __future__ import annotations
@@ -20,13 +20,15 @@ from axisight.simulation import simulate, white_noise
 
 Array = NDArray[np.float64]
 
-# Of the noise of measured speeds, in the upper part of the band: references have none of it. More is left
-# where the machine's controller is not the stated one.
+# Largest noise of a reconstructed reference in the upper part of the band, relative to the noise of measured
+# speeds; a reference should have none. More is left if the machine has another controller. And start of the
+# upper part, as a share of the Nyquist frequency.
 _NOISE_LEFT = 0.1
 _UPPER = 0.8
-# Of the largest speed: what would begin with less begins at rest, its weight not quite the simulator's.
+# Largest speed step at the start that counts as rest, as a share of the largest speed. It comes from a holding
+# torque that differs a little from the simulator's.
 _STEP = 0.01
-# By how much a sample time may be off and still be that of the controller.
+# Largest relative difference between the sample times of a log and of the controller.
 _SAME_CLOCK = 1e-3
 
 SAYS = (
@@ -36,11 +38,12 @@ SAYS = (
 
 
 def with_references(robot: Robot, logs: Sequence[Log]) -> list[Log] | None:
-    """Return logs with the references (n, n_axes) [rad/s] that they lack; None where none are to be had.
+    """Return logs with reconstructed references (n, n_axes) [rad/s]; None if they cannot be reconstructed.
 
-    Only for a robot of elastic gears with a controller, whose torque no inverse dynamics predicts, and
-    where no log has references, and all begin at rest and have every sample of the controller. None, too,
-    where they are as noisy as measured speeds: the torque is not that of this controller.
+    Conditions: the robot has elastic gears, since inverse dynamics predicts the torque of rigid ones. It has a
+    controller with a positive ``kp``. No log has references. All logs start at rest and have the controller's
+    sample time. If a reconstructed reference is as noisy as measured speed, the torque comes from another
+    controller, and None is returned.
     """
     missing = all(log.velocity_ref_rad_s is None for log in logs)
     if not robot.told_speeds or not missing or rigid_below_hz(robot) == np.inf:
@@ -60,11 +63,11 @@ def with_references(robot: Robot, logs: Sequence[Log]) -> list[Log] | None:
 
 
 def reference_of(robot: Robot, log: Log) -> Array:
-    """Return the velocity reference (n, n_axes) [rad/s] for which the controller commands the torque of a log.
+    """Return the velocity reference (n, n_axes) [rad/s] for which the controller commands a log's torque.
 
-    `gain_shares` solved for the reference. Either the first sample commands what holds the arm, or the
-    reference begins with a step and the simulator's weight holds it: what that is off by is forgotten as
-    the integral of the error is.
+    `gain_shares`, solved for the reference. At the first sample the holding torque is either the logged one, or
+    the simulator's with a step of the reference. An error of this choice decays with the integral of the loop's
+    error.
     """
     gains, step = robot.controller_gains, log.sample_time_s
     kp, ki = np.asarray(gains["kp"]), np.asarray(gains.get("ki", np.zeros(log.n_axes)))
@@ -79,9 +82,9 @@ def reference_of(robot: Robot, log: Log) -> Array:
 
 
 def _holding_nm(robot: Robot, log: Log) -> Array:
-    """Return the torque (n_axes,) [Nm] that holds the arm before the log begins.
+    """Return the torque (n_axes,) [Nm] that holds the arm before a log starts.
 
-    The first one, or the simulator's where that would make the first one a step of the reference.
+    The first logged torque; the simulator's, if the difference would be a visible step of the reference.
     """
     run = simulate(robot, np.zeros((1, log.n_axes)), start_rad=log.start_rad)
     simulated = run["torque_cmd_nm"].values[0]
@@ -104,7 +107,7 @@ def _has_every_sample(log: Log, robot: Robot) -> bool:
 
 
 def _noisy(reference: Array, log: Log, noise_std: float) -> bool:
-    """Whether a reference has the noise of measured speeds on any axis, or of the stated sensor's if that is more."""
+    """Whether a reference has the noise of measured speeds on any axis, or of the stated sensor's if that is larger."""
     noise = white_noise(0, 0, *log.position_rad.shape) * noise_std
     speeds = [np.diff(x, axis=0) / log.sample_time_s for x in (log.position_rad, noise)]
     theirs = np.max([_upper_rms(x) for x in speeds], axis=0)
@@ -112,6 +115,6 @@ def _noisy(reference: Array, log: Log, noise_std: float) -> bool:
 
 
 def _upper_rms(x: Array) -> Array:
-    """Return the rms (n_axes,) of what lies in the upper part of the band."""
+    """Return the rms (n_axes,) of the upper part of the band."""
     spectrum = np.abs(np.fft.rfft(x * np.hanning(len(x))[:, None], axis=0)) ** 2
     return np.asarray(np.sqrt(spectrum[int(_UPPER * len(spectrum)) :].mean(axis=0)))

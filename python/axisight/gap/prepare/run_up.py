@@ -1,8 +1,8 @@
-"""Simulations along a log that begins in motion: run up to it from rest, compared once that is forgotten.
+"""Runs simulations up from rest to logs that start in motion.
 
-What a log does not hold of its beginning (deflections of gears, what a controller had summed up, where
-lost motion lies) a simulation brings along by itself once it is in that motion: it comes into it
-from rest, smoothly, and the loop forgets what was different about the machine as its slowest mode decays.
+A log does not contain the deflections of gears, the sums of the controller and the side of lost motion at its
+start. A simulation produces them when it is driven smoothly from rest into the motion. What differs from the
+machine decays with the slowest mode of the loop. The comparison starts after that.
 """
 
 from __future__ import annotations
@@ -26,31 +26,36 @@ from axisight.simulation import simulate
 
 Array = NDArray[np.float64]
 
-# Seconds in which a simulation comes from rest to the first motion of a log (`LEAST_SAMPLES` at least), and
-# those over which that is estimated, at least so many samples.
+# Duration of the run-up [s], with at least `LEAST_SAMPLES`; and duration [s] and fewest samples from which the
+# first motion of a log is estimated.
 RUN_UP_S = 0.5
 _SEEN_S = 0.02
 _SEEN_SAMPLES = 8
-# Of a log whose samples are so many of the simulation, at least so many of its own.
+# Fewest logged samples from which the first motion is estimated, for logs sampled slower than the controller.
 _SEEN_STEPS = 4
-# Share of a log that has to be left.
+# Smallest share of a log that must be left.
 _LEFT = 0.5
-# Its start depends on the torque that holds the robot there, which depends on it: by a thousandth a step.
+# Iterations for the start angle, which depends on the holding torque there. Each step leaves 0.1 % of the
+# error.
 _STEPS = 2
 
 
 class NotRunUpError(InputError):
-    """A log that begins in motion and that no simulation can be run up to; says why."""
+    """No run-up is possible to a log that starts in motion; the message says why."""
 
 
 def run_up_to(
     robot: Robot, loops: Sequence[Robot], log: Log, *, compared: Compared = "torques", step: int = 1
 ) -> Log:
-    """Return a log from where a simulation that is run up to its first motion has forgotten how it began.
+    """Return a log with a run-up, from where the simulation has forgotten its start.
 
-    ``loops``: the robot as it is simulated, with one controller or another: all have to forget; what is cut
-    off the log, a whole number of ``step`` samples, is simulated with the run-up. ``compared``: what the state
-    is estimated by. Raises NotRunUpError where too little is left, a loop does not settle or the arm does not.
+    - ``loops``: the robot with every controller that it is simulated with. All of them have to forget their
+      start.
+    - ``compared``: the quantity from which the first state is estimated.
+    - ``step``: the cut is a whole number of so many samples.
+
+    The run-up contains the part that is cut off the log. Raises NotRunUpError if too little of the log is left,
+    or if a loop or the arm does not settle.
     """
     signals = (log.led(name) for name in ("position_rad", "torque_nm", "velocity_ref_rad_s"))
     if not all(np.isfinite(signal).all() for signal in signals):
@@ -78,7 +83,7 @@ def _first(signal: Array, step_s: float, seen: int, order: int) -> Array:
 
 
 def _burn_in_s(log: Log, decay_1_s: float, step: int) -> float:
-    """Return after which time [s] of a log a loop has forgotten its beginning, in whole steps of samples."""
+    """Return the time [s] after which a loop has forgotten its start, in whole steps of samples."""
     if not decay_1_s > 0:
         raise NotRunUpError(f"{log.name}: the loop does not settle where the log begins")
     seconds = -np.log(FORGOTTEN) / decay_1_s
@@ -102,9 +107,9 @@ def _references(log: Log, seen: int) -> Array:
 
 
 def _start_rad(robot: Robot, log: Log, position: Array, references: Array, burn_s: float) -> Array:
-    """Return the joint angles [rad] from which references end where the controller had summed them up to.
+    """Return the joint angles (n_axes,) [rad] from which the run-up ends at the controller's state in the log.
 
-    ``position`` (n_axes,) [rad] of the motors where the log begins.
+    ``position`` (n_axes,) [rad]: motor positions at the start of the log.
     """
     travel = references.sum(axis=0) * log.sample_time_s
     start = start_of(robot, position)
@@ -115,11 +120,11 @@ def _start_rad(robot: Robot, log: Log, position: Array, references: Array, burn_
 
 
 def _angle_error(robot: Robot, log: Log, held_nm: Array, burn_s: float) -> Array:
-    """Return by how much the controller's summed reference is ahead of the motors where a log begins (n_axes,) [rad].
+    """Return the lead of the controller's summed reference over the motors at the start of a log (n_axes,) [rad].
 
-    By its law: what is constant of the torque beyond that which holds the robot, or, of a cascade, what grows
-    with time. Zero where the law does not depend on it. Targets are ahead of positions by what the log says,
-    but for what gravity makes constant of it.
+    It follows from the torque that the law does not explain: its constant beyond the holding torque or, in a
+    cascade with an integral, its slope. Zero if the law has no such term. For targets it is the logged lead
+    without its mean, which gravity causes.
     """
     reference, time = log.velocity_ref_rad_s, log.sample_time_s
     assert reference is not None  # closed loop only
@@ -144,12 +149,12 @@ def _angle_error(robot: Robot, log: Log, held_nm: Array, burn_s: float) -> Array
 
 
 def _over(x: Array, by: Array) -> Array:
-    """Return a quotient, zero where the divisor is."""
+    """Return a quotient; zero where the divisor is not positive."""
     return np.asarray(np.where(by > 0, x / np.where(by > 0, by, 1.0), 0.0))
 
 
 def _run_up(robot: Robot, log: Log, position: Array, references: Array, start_rad: Array) -> RunUp:
-    """Return what a simulation does along references, brought smoothly to a log's first position and torque."""
+    """Return the simulated run-up along references, shifted smoothly to a log's first position and torque."""
     run = simulate(robot, references, method="rk4", start_rad=start_rad)
     moved, torque = run["position_rad"].values, run["torque_cmd_nm"].values
     if len(moved) < len(references) or not np.isfinite(moved).all():
@@ -161,7 +166,7 @@ def _run_up(robot: Robot, log: Log, position: Array, references: Array, start_ra
 
 
 def _behind(log: Log, burn_s: float) -> Log:
-    """Return a log with a run-up from ``burn_s`` on, what is before it a part of its run-up."""
+    """Return a log from ``burn_s`` [s] on; the part before it is added to the run-up."""
     rest = log.part(burn_s)
     n = log.lead + log.n_samples - rest.n_samples
     run_up = RunUp(
@@ -173,7 +178,7 @@ def _behind(log: Log, burn_s: float) -> Log:
 
 
 def begins_in_motion(log: Log, start_s: float) -> Finding:
-    """Return what is to be said of a log with a run-up that is compared from ``start_s`` of what was logged."""
+    """Return the finding about a log with a run-up that is compared from ``start_s`` [s] on."""
     message = (
         "expected a start at rest, like the simulation, got a start in motion and no rest in the first half. The "
         "simulation is run up from rest to the measured position, speed and reference. It is compared from "

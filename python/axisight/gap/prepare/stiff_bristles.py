@@ -1,4 +1,4 @@
-"""Bristles that a fit can follow: slipping faster than its fixed steps, they fly apart."""
+"""Slows bristles of friction effects that relax faster than the fixed steps of a fit can follow."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from axisight.robot import Robot
 
 
 def with_bristles_followed(robot: Robot) -> tuple[Robot, tuple[Finding, ...]]:
-    """Return a simulator whose bristles slip no faster than a step, and a finding for each that did.
+    """Return a simulator whose bristles relax no faster than one step, and a finding for each changed one.
 
-    With a relaxation of one step ``T`` the rate of the bristles is ``1 / T`` at most, of which Runge-Kutta steps
-    of order four stand 2.8.
+    With a relaxation time of one step ``T`` the rate of the bristles is at most ``1 / T``. A Runge-Kutta step
+    of order four is stable up to ``2.8 / T``.
     """
     step = robot.sample_time_s
     fast = {e: names for e in robot.effects if (names := _faster(e, step))}
@@ -25,7 +25,7 @@ def with_bristles_followed(robot: Robot) -> tuple[Robot, tuple[Finding, ...]]:
 
 
 def _faster(effect: Effect, step: float) -> list[str]:
-    """Return the parameters by which an effect changes faster than a step."""
+    """Return the time parameters of an effect that are shorter than a step."""
     times = effect_info(effect.name).marked("fastest_time")
     return [name for name in times if _value(effect, name) < step]
 

@@ -1,4 +1,4 @@
-"""The part of each log that is used: between two times, from first to last motion, or a run a motion."""
+"""Selects the used part of each log: between two times, from the first to the last motion, or motion by motion."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from axisight.logs import Log
 Array = NDArray[np.float64]
 Span = tuple[float, float | None]
 
-# Seconds over which a mean speed is taken; of the largest speed, below which a motor stands; and deviations of
-# the noise of a mean speed.
+# Window of a mean speed [s]; speed below which a motor stands, as a share of the largest; and standard
+# deviations of the mean speed's noise that are added to it.
 REST_S = 0.2
 STANDS = 0.005
 _NOISES = 6.0
-# Rest [s] that is kept before and after a motion, and that between two motions which makes them runs.
+# Rest that is kept before and after a motion [s], and rest that separates two motions [s].
 _KEPT_S = 0.2
 _BETWEEN_S = 0.5
 # Shortest part of a log [s].
@@ -30,9 +30,10 @@ _SHORTEST_S = 1.0
 
 @dataclass(frozen=True)
 class Used:
-    """What is used of each log: from ``start_s`` to ``stop_s`` [s], None its end.
+    """The used part of each log: from ``start_s`` to ``stop_s`` [s]; None is the end.
 
-    ``moving``: of that, from the first to the last motion; ``runs``: each motion between rests of all axes.
+    ``moving``: only from the first to the last motion of that part; ``runs``: each motion between rests of all
+    axes is a log.
     """
 
     start_s: float = 0.0
@@ -42,15 +43,15 @@ class Used:
 
     @property
     def whole(self) -> bool:
-        """Whether logs stay as they are."""
+        """Whether logs stay unchanged."""
         return self == WHOLE
 
     def of(self, log: Log) -> list[Log]:
-        """Return the runs that are used of a log: one without ``runs``; raises InputError naming the option."""
+        """Return the used parts of a log, one without ``runs``; raises InputError naming the option."""
         return self.beside(log, log)
 
     def beside(self, log: Log, other: Log) -> list[Log]:
-        """Return of an ``other`` log what `of` returns of ``log``, by the same times."""
+        """Return the parts of an ``other`` log at the times of those that `of` returns for ``log``."""
         if self.whole:
             return [other]
         part, out = _part(other, self.start_s, self.stop_s), []
@@ -61,7 +62,7 @@ class Used:
         return out
 
     def one_of(self, log: Log) -> Log:
-        """Return the one part of a log that is used, where runs are not asked for."""
+        """Return the used part of a log without cutting it into runs."""
         (one,) = replace(self, runs=False).of(log)
         return one
 
@@ -76,14 +77,14 @@ class Used:
 
 
 WHOLE = Used()
-"""Logs as they are."""
+"""The whole log."""
 
 
 def motions(log: Log, between_s: float) -> list[Span]:
-    """Return from where to where [s] a log moves, with a little rest before and after each.
+    """Return start and end [s] of each motion in a log, with a short rest before and after it.
 
-    Rests of all motors and references of up to ``between_s`` do not part it, and none is shorter than a part
-    of a log may be.
+    Rests of all motors and references up to ``between_s`` [s] do not split a motion. Each span has the shortest
+    length of a log, if the log is that long.
     """
     at = np.flatnonzero(~stands(log))
     if not len(at):
@@ -94,21 +95,21 @@ def motions(log: Log, between_s: float) -> list[Span]:
     for part in parts:
         first, last = float(part[0] * step), float(part[-1] * step)
         if spans and spans[-1][1] - spans[-1][0] < _SHORTEST_S:
-            # A short move is no log: it goes with the next one.
+            # A motion too short for a log is joined with the next one.
             first = spans.pop()[0] + _KEPT_S
         spans.append((max(first - _KEPT_S, 0.0), min(last + _KEPT_S, end)))
     first, last = spans[-1]
     if last - first < _SHORTEST_S and len(spans) > 1:
         spans[-2:] = [(spans[-2][0], last)]
     elif last - first < _SHORTEST_S:
-        # One short move: as much rest around it as a log needs.
+        # A single short motion gets the rest around it that a log needs.
         last = min(first + _SHORTEST_S, end)
         spans[-1] = (max(min(first, last - _SHORTEST_S), 0.0), last)
     return [*spans]
 
 
 def stands(log: Log) -> NDArray[np.bool_]:
-    """Return where (n_samples,) all motors of a log stand, and their references."""
+    """Return where all motors of a log and their references stand (n_samples,)."""
     n = max(4, round(REST_S / log.sample_time_s))
     speed = _speeds(log, n)
     noise = position_noise_std([log]) / (log.sample_time_s * n)
@@ -121,18 +122,18 @@ def stands(log: Log) -> NDArray[np.bool_]:
 
 
 def _speeds(log: Log, n: int) -> Array:
-    """Return the mean speed (n_samples, n_axes) over ``n`` samples around each."""
+    """Return the mean speed (n_samples, n_axes) over ``n`` samples around each sample."""
     mean = scipy.ndimage.uniform_filter1d(
         np.gradient(log.position_rad, log.sample_time_s, axis=0), n, axis=0, mode="nearest"
     )
-    # At the ends, where a window is not full, as at the nearest one that is.
+    # At the ends, the mean speed of the nearest full window.
     half = n // 2
     mean[:half], mean[-half:] = mean[half], mean[-half - 1]
     return np.abs(mean)
 
 
 def _part(log: Log, start_s: float, stop_s: float | None) -> Log:
-    """Return what ``--from`` and ``--to`` [s] leave of a log; raises InputError naming them."""
+    """Return the part of a log between ``--from`` and ``--to`` [s]; raises InputError naming these options."""
     if (start_s, stop_s) == (0.0, None):
         return log
     try:
