@@ -1,4 +1,4 @@
-"""The gate before a diagnosis: simulator and logs are looked at before anything is fitted to them."""
+"""The gate before a diagnosis: checks simulator and logs before anything is fitted to them."""
 
 from axisight.gap.facts.faults import MEANINGS, Finding, RefusedInputError
 from axisight.gap.gate.inspect import (

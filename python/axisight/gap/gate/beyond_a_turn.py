@@ -1,4 +1,4 @@
-"""Whether joints turn further than joints do, where no torque tells in which unit their angles are."""
+"""Finds joint angles beyond a turn in logs without torque, where nothing else shows their unit."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# One axis of an arm may turn on and on; of two or more this share does not.
+# Smallest number of axes beyond a turn, and smallest share of the rotary axes. A single axis of an arm may turn
+# without limits.
 _AXES = 2
 _SHARE = 0.5
 
 
 def check_turns(robot: Robot, log: Log) -> list[Finding]:
-    """Return a finding where most joints that turn are at angles beyond a turn: of degrees, or of motors.
+    """Return a finding if most rotary joints have angles beyond a turn: degrees, or motor angles.
 
-    Targets in the same unit follow the positions: against them nothing shows.
+    Targets in the same unit follow the positions, so that a comparison with them shows nothing.
     """
     if log.position_ref_rad is None or log.n_axes != robot.n_axes:
         return []

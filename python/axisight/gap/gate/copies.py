@@ -1,4 +1,4 @@
-"""Logs that are one another's copies: a validation log must not have been fitted to."""
+"""Finds logs that are copies of each other: a validation log must not be used for fitting."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ Hashes = NDArray[np.uint64]
 
 # Bits of the finalizer of MurmurHash3 (Appleby, public domain).
 _SHIFT = np.uint64(33)
-# Rows of different runs agree to the last bit where sensors are coarse and the machine rests, at
-# most; rows with noise never do.
+# Shares of common rows from which logs are flagged, and from which they count as copies. Rows of different runs
+# are equal only with coarse sensors at rest, never with noise.
 _SHARED_ROWS = 0.05
 _COPY = 0.5
 
 
 def check_copies(estimation: Sequence[Log], validation: Sequence[Log]) -> list[Finding]:
-    """Return findings about logs that share rows of position and torque, exactly."""
+    """Return findings about logs that share exactly equal rows of position and torque."""
     out = []
     tables = [_rows(log) for log in (*estimation, *validation)]
     every = np.sort(np.concatenate(tables))
-    if not np.any(every[1:] == every[:-1]):  # as it should be
+    if not np.any(every[1:] == every[:-1]):  # the normal case
         return []
     fitted, held = tables[: len(estimation)], tables[len(estimation) :]
     for logs, own_tables in ((estimation, fitted), (validation, held)):
@@ -54,11 +54,11 @@ def check_copies(estimation: Sequence[Log], validation: Sequence[Log]) -> list[F
 
 
 def _rows(log: Log) -> Hashes:
-    """Return the distinct rows of position and torque, each by a number of 64 bits, sorted."""
+    """Return the distinct rows of position and torque of a log as hashes of 64 bits, sorted."""
     bits = np.hstack((log.position_rad, log.torque_nm)).view(np.uint64)
     out = np.zeros(len(bits), dtype=np.uint64)
     for column in bits.T:
-        # Every bit of a row moves half of those of its number: rows that differ share one by a
+        # Each bit of a row changes half of the bits of its hash. Two different rows have the same hash with a
         # chance of 1 in 2^64.
         out = _mixed(out ^ column)
     return np.unique(out)
@@ -72,7 +72,7 @@ def _mixed(x: Hashes) -> Hashes:
 
 
 def _shared(rows: Hashes, other: Hashes) -> float:
-    """Return the share of ``rows`` that ``other`` has too."""
+    """Return the share of ``rows`` that are also in ``other``."""
     if not rows.size:
         return 0.0
     return np.intersect1d(rows, other, assume_unique=True).size / rows.size

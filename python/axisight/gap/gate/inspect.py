@@ -1,4 +1,4 @@
-"""All checks in their order: what later ones rest on first."""
+"""Runs all checks of the gate in order: first those on which later ones rest."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from axisight.robot import Robot
 def pass_gate(
     robot: Robot, estimation: Sequence[Log], validation: Sequence[Log], taken: Collection[str] = ()
 ) -> tuple[Finding, ...]:
-    """Return what is to be said of a simulator and its logs; raise RefusedInputError if they cannot be.
+    """Return the findings about a simulator and its logs; raise RefusedInputError if one is a refusal.
 
     Arguments as in :func:`check_inputs`.
     """
@@ -39,7 +39,10 @@ def pass_gate(
 def pass_gate_by_targets(
     robot: Robot, estimation: Sequence[Log], validation: Sequence[Log], taken: Collection[str] = ()
 ) -> tuple[Finding, ...]:
-    """Return the same of logs whose torque is what the controller commands along them, at their own rate."""
+    """Return the findings about logs with commands instead of logged torque, at their own rate.
+
+    Raises RefusedInputError if one is a refusal.
+    """
     findings = check_by_targets(robot, estimation, validation, despite=taken)
     if refused(findings):
         raise RefusedInputError(findings)
@@ -53,7 +56,7 @@ def check_by_targets(
     *,
     despite: Collection[str] = (),
 ) -> tuple[Finding, ...]:
-    """Return every fault of such logs that shows without a fit; ``despite`` as in :func:`check_inputs`."""
+    """Return all faults of logs with commands that show without a fit; ``despite`` as in :func:`check_inputs`."""
     check_names(despite)
     logs = [*estimation, *validation]
     found = [f for f in check_machine(robot, logs) if f.name != "sample_time_differs"]
@@ -71,13 +74,17 @@ def check_inputs(
     *,
     despite: Collection[str] = (),
 ) -> tuple[Finding, ...]:
-    """Return every fault of a simulator and its logs that shows without a fit.
+    """Return all faults of a simulator and its logs that show without a fit.
 
-    ``robot``: the simulator; ``estimation``, ``validation``: logs of it. First what the robot file says
-    of all logs, then each log for itself, then logs against one another, then against the simulator:
-    by the controller's law in closed loop, by inverse dynamics otherwise. What is refused at one of
-    these stages is not taken further, for what follows rests on it. ``despite``: names of faults that
-    are flagged only. Raises InputError for one that no diagnosis can be made with.
+    ``robot``: the simulator; ``estimation``, ``validation``: logs of its machine. The checks run in stages:
+
+    - the robot file against all logs;
+    - each log alone, and logs against each other;
+    - logs against the simulator: by the controller's law in closed loop, else by inverse dynamics;
+    - the start and the noise of the logs.
+
+    A stage with a refusal is the last one, since later stages rest on it. ``despite``: names of faults that are
+    only flagged. Raises InputError for a name that is no fault, or for a fault that rules out any diagnosis.
     """
     check_names(despite)
     found: list[Finding] = []
@@ -106,7 +113,7 @@ def _against_simulator(robot: Robot, estimation: _Logs, validation: _Logs) -> li
     found = _closed_loop(robot, logs) if closed else check_inverse(robot, logs)
     turned = [] if closed and refused(found) else check_turned_axes(robot, logs)
     if turned:
-        # By inverse dynamics what turns the other way may look like another mistake.
+        # By inverse dynamics, a turned axis may look like another mistake.
         found = [f for f in found if f.severity != "refuse"]
     return [*_references(robot, logs), *found, *turned]
 
@@ -118,10 +125,10 @@ def _at_last(robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding
 
 
 def check_fit_inputs(robot: Robot | None, logs: Sequence[Log]) -> tuple[Finding, ...]:
-    """Return the faults of logs that are to be fitted to, without a simulator of the machine.
+    """Return the faults of logs for a fit without a simulator of the machine.
 
-    What `check_inputs` finds in each log for itself, in copies among them, and in the gears of the
-    robot file, if there is one; logs may have another sample time than the robot, but not in ms or us.
+    Like `check_inputs`, for each log alone, copies among the logs, and the gears of a robot file if there is
+    one. Logs may have another sample time than the robot, but not in ms or us.
     """
     found = [] if robot is None else check_machine(robot, logs)
     out = [f for f in found if f.name != "sample_time_differs"]
@@ -130,15 +137,15 @@ def check_fit_inputs(robot: Robot | None, logs: Sequence[Log]) -> tuple[Finding,
 
 
 def _of_each(check: Callable[[Log], list[Finding]], logs: Sequence[Log]) -> list[Finding]:
-    """Return what a check finds in each log, in their order; they are looked at beside one another."""
+    """Return the findings of a check for each log, in the order of the logs. The checks run in parallel."""
     with ThreadPoolExecutor() as pool:
         return [finding for found in pool.map(check, logs) for finding in found]
 
 
 def _closed_loop(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
-    """Return the findings of each log against its controller, whose clock may be its own.
+    """Return the findings of each log against the controller, with the drift between two clocks undone.
 
-    References that drift away from the machine look like any mistake.
+    Drifting references look like any other mistake.
     """
 
     def found(seen: Sequence[Log]) -> list[Finding]:
@@ -150,7 +157,7 @@ def _closed_loop(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
 
 
 def _references(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
-    """Flag references missing in some logs: the comparison falls back to inverse dynamics."""
+    """Flag references that are missing in some logs: then all logs are compared by inverse dynamics."""
     missing = [log for log in logs if log.velocity_ref_rad_s is None]
     if robot.controller_kind == "none" or not missing or len(missing) == len(logs):
         return []

@@ -1,4 +1,4 @@
-"""What is wrong with one log for itself: what ``axisight check`` knows, on a log already read."""
+"""Checks one log alone, as ``axisight check`` does, after it has been read."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from axisight.records.clipping import clipped_samples
 Array = NDArray[np.float64]
 Channel = tuple[str, int]
 
-# Log field -> attribute; the optional ones may be NaN on axes without the sensor.
+# Attribute of a log for each field. The optional ones may be NaN on axes without the sensor.
 _REQUIRED = {"position": "position_rad", "torque": "torque_nm"}
 _REFERENCE = {"velocity_ref": "velocity_ref_rad_s"}
 _OPTIONAL = {"velocity": "velocity_rad_s"}
-# A dead channel of an axis whose reference travels this far [rad, or m] is no axis at rest: a
-# thousand times the noise of a usual motor sensor.
+# Travel of a reference [rad, or m] from which a constant channel is dead, not at rest. It is 1000 times the
+# noise of a usual motor sensor.
 _TRAVEL = 0.01
 _LIMIT = ", or the drive stays at its limit and cannot hold the arm"
 
 
 def channels(log: Log) -> tuple[dict[Channel, Array], dict[Channel, str]]:
-    """Return the signals (n,) of a log by field and axis from 0, and the names of their columns."""
+    """Return the signals (n,) of a log by field and axis (from 0), and the names of their columns."""
     signals: dict[Channel, Array] = {}
     for field, attribute in {**_REQUIRED, **_REFERENCE, **_OPTIONAL}.items():
         values = getattr(log, attribute)
@@ -55,10 +55,10 @@ def check_log_alone(log: Log) -> list[Finding]:
     if any(finding.severity == "error" for finding in wrong):
         return [named(finding, log) for finding in wrong]
     slides = [kind == "prismatic" for kind in log.axis_kinds]
-    # A reference may be constant, or of few levels: it is a choice, not a measurement.
+    # References are chosen, not measured: they may be constant or have few levels.
     measured = {c: x for c, x in signals.items() if c[0] not in _REFERENCE}
     looked = look_at_signals(measured, labels, slides)
-    if not log.is_resampled:  # steps and rests between interpolated stamps are those of the grid
+    if not log.is_resampled:  # interpolation causes steps and rests of its own
         looked += check_rows(measured, labels, log.sample_time_s)
     out = [named(f, log) for f in looked if f.severity != "ok" and f.name]
     return [
@@ -69,14 +69,14 @@ def check_log_alone(log: Log) -> list[Finding]:
 
 
 def named(finding: LogFinding, log: Log) -> Finding:
-    """Return a finding about a log as one of the gate; an error is refused."""
+    """Return a log's finding as one of the gate; an error becomes a refusal."""
     severity: GateSeverity = "refuse" if finding.severity == "error" else "flag"
     name = finding.name or "not_finite"
     return Finding(name, severity, finding.message, log.name, finding.axis, finding.column)
 
 
 def _reference_missing(finding: LogFinding, values: Array) -> LogFinding:
-    """A reference that is NaN throughout is one that is missing."""
+    """Return the finding *reference missing* for a reference that is NaN throughout; other findings unchanged."""
     if not finding.column.startswith("velocity_ref") or not np.isnan(values).all():
         return finding
     message = (
@@ -87,7 +87,7 @@ def _reference_missing(finding: LogFinding, values: Array) -> LogFinding:
 
 
 def _dead(finding: Finding, log: Log) -> Finding:
-    """Refuse a constant channel of an axis that moves, or is told to."""
+    """Turn a constant channel into a refusal if its axis moves or has a moving reference."""
     if finding.name != "channel_constant" or finding.axis is None:
         return finding
     axis = finding.axis - 1
@@ -122,7 +122,7 @@ def _clipped(log: Log, labels: dict[Channel, str]) -> list[Finding]:
 
 
 def _velocity(log: Log, slides: list[bool]) -> list[Finding]:
-    """Flag a measured velocity that is not the position's: a diagnosis does not use it."""
+    """Flag a measured velocity that is not the derivative of the position; the position is used instead."""
     out = []
     measured = log.velocity_rad_s
     for axis in range(log.n_axes if measured is not None else 0):

@@ -1,4 +1,4 @@
-"""The robot file against the logs: axes, sample time, gears."""
+"""Checks the robot file against the logs: axes, sample time, gears."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from axisight.logs import Log
 from axisight.logs.grid import RATE_TOLERANCE
 from axisight.robot import Robot
 
-# Joint angle per motor angle of a gear that speeds up. One to five exists in principle; beyond, it
-# is the ratio as catalogues print it (50:1 to 300:1).
+# Joint angle per motor angle that is flagged, for a gear that speeds up, and that is refused. A ratio of 5
+# exists in principle; larger ones are catalogue ratios (50:1 to 300:1), the inverse.
 _SUSPICIOUS_RATIO = 1.0 + 1e-9
 _IMPOSSIBLE_RATIO = 5.0
 _DIFFERS = "sample_time_differs"
@@ -35,7 +35,7 @@ def check_machine(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
 
 
 def _at_its_own_rate(robot: Robot, log: Log, first: Log) -> bool:
-    """Whether torque is predicted at the rate of a log: no controller of speed samples it, and all have it."""
+    """Whether torque is predicted at the logs' own rate: no controller of speeds, and one rate for all logs."""
     same = abs(log.sample_time_s / first.sample_time_s - 1.0) <= RATE_TOLERANCE
     return same and not robot.told_speeds
 

@@ -1,4 +1,4 @@
-"""The floor before it is used: noise and steps of the positions against the robot file's sensor."""
+"""Checks noise and steps of positions against the sensor of the robot file; both raise the floor."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from axisight.logs import Log
 from axisight.logs.quality import quantization
 from axisight.robot import Robot
 
-# Sensors of one type differ by less; steps are felt from where their noise reaches the sensor's.
+# Ratio of measured to stated noise that is flagged; sensors of one type differ by less. And noise of a step,
+# relative to the step: steps matter from where this noise reaches the stated one.
 _LOUD = 5.0
 _STEP_NOISE = 1.0 / np.sqrt(12.0)
-# Without a stated noise: fewer levels over the range than an encoder of twelve bits has.
+# Fewest bits over the range of a position that are not flagged, without a stated noise.
 _FEW_BITS = 12.0
 
 
 def check_noise(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
-    """Return flags about positions noisier or coarser than the sensor of the robot file."""
+    """Return flags about positions that are noisier or coarser than the sensor of the robot file."""
     stated = robot.position_noise_std
     out = []
     for log in logs:

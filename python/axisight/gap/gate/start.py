@@ -1,4 +1,4 @@
-"""Where a closed-loop log starts, and the torque that holds it, against the robot at rest."""
+"""Checks the start of closed-loop logs, and the torque that holds the arm, against the robot at rest."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from axisight.logs import Log
 from axisight.robot import Robot
 from axisight.simulation import simulate
 
-# The mean torque of an axis counts as gravity's where it exceeds this share of the torque's rms;
-# turned round, it is that of the simulator within a factor of two (a payload, its absence).
+# Smallest simulated mean torque, as a share of the rms, that is caused by gravity. And range of the ratio of
+# measured to simulated mean that shows gravity with the wrong sign: within a factor of two, for a payload or
+# its absence.
 _GRAVITY_SHARE = 0.5
 _TURNED_ROUND = (-2.0, -0.5)
 
 
 def check_start(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
-    """Return findings about the first position of the logs, and the sign of gravity."""
+    """Return findings about the first positions of the logs, and the sign of gravity."""
     out = []
     rest = robot.equilibrium()["motor_angle_rad"].values
     for log in logs:
@@ -38,7 +39,10 @@ def check_start(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
 
 
 def _gravity(robot: Robot, log: Log) -> list[Finding]:
-    """Compare mean torques: friction and motion leave little in a mean, gravity all it has."""
+    """Return a refusal if the mean torques show gravity with the other sign.
+
+    Friction and motion nearly cancel in a mean; gravity stays.
+    """
     references = log.led("velocity_ref_rad_s")
     run = simulate(robot, references, method="rk4", start_rad=log.start_rad)
     simulated = run["torque_cmd_nm"].values[log.lead :]

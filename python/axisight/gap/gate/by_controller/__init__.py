@@ -1,1 +1,1 @@
-"""Logs against the controller's law: columns, signs, units, clocks."""
+"""Checks logs against the controller's law: columns, signs, units, clocks."""

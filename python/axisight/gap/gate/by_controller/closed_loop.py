@@ -1,4 +1,4 @@
-"""Closed-loop logs against the controller of the robot file: whose column, sign, unit and time is off."""
+"""Checks closed-loop logs against the controller of the robot file: wrong columns, signs, units and times."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from axisight.gap.signals.unit_scales import scale_name
 from axisight.logs import Log
 from axisight.robot import Robot
 
-# The law holds to a thousandth on logs of simulated machines with any effect, limits included; what is
-# named has to hold as well, with factors of one. Other gains than those of the file, filters and
-# feed-forward leave more, and are flagged.
+# Share of the torque's variance that the law must explain to hold, and below which an axis is flagged. On
+# simulated machines with any effect, the law leaves 0.1 %, limits included. A named mistake must leave as
+# little, with factors near one. Other gains, filters and feedforward leave more.
 HOLDS = 0.99
 _EXPLAINED = 0.9
+# Ranges of the factors of reference and position: near one, of the stated gains, and of other gains.
 _ONE = (0.9, 1.1)
 _SAME_GAINS = (0.8, 1.25)
 _OTHER_GAINS = (0.2, 5.0)
-# A controller may read its sensor this late by itself: an effect, for the diagnosis to find.
+# Delay up to which a channel is only flagged [s]: a controller may read its sensor that late, which is an
+# effect.
 _LATE_S = 0.012
 _ANGLES = ("position_in_degrees", "position_in_revolutions")
 _CHANNELS = {"torque": "torque_cmd", "velocity_ref": "velocity_ref", "position": "position"}
@@ -29,7 +31,7 @@ _CHANNELS = {"torque": "torque_cmd", "velocity_ref": "velocity_ref", "position":
 
 @dataclass(frozen=True)
 class _Axis:
-    """What is known of one axis of one log, axes from 0."""
+    """The result for one axis of one log; axes from 0."""
 
     index: int
     as_given: LawFit
@@ -40,7 +42,7 @@ class _Axis:
 
 
 def check_closed_loop(robot: Robot, log: Log) -> list[Finding]:
-    """Return findings about channels that do not fit one another by the controller's law."""
+    """Return findings about channels that contradict the controller's law."""
     law = ControlLaw(robot, log)
     looked = [_look(law, i, robot.n_axes) for i in range(robot.n_axes)]
     out: list[Finding] = []
@@ -66,7 +68,7 @@ def _look(law: ControlLaw, i: int, n_axes: int) -> _Axis:
     as_given = law.fit(i, i, i)
     if not as_given.explained < HOLDS:
         return _Axis(i, as_given, i, i, as_given, None)
-    # One column that was mistaken: reference, position, or torque with the gains of its own axis.
+    # A single wrong column: reference, position, or torque with the gains of its own axis.
     others = [j for j in range(n_axes) if j != i]
     fits = [(law.fit(i, j, i), j, i) for j in others]
     fits += [(law.fit(i, i, j), i, j) for j in others]
@@ -79,7 +81,7 @@ def _look(law: ControlLaw, i: int, n_axes: int) -> _Axis:
 
 
 def _believed(fit: LawFit) -> bool:
-    """Whether a law holds: as well as it does without mistakes, with factors of one."""
+    """Whether a law holds, with factors of reference and position near one."""
     factors = [x for x in (fit.reference, fit.position) if math.isfinite(x)]
     return fit.explained >= HOLDS and all(_within(x, _ONE) for x in factors)
 
@@ -126,7 +128,7 @@ def _factors(robot: Robot, log: Log, i: int, fit: LawFit) -> list[Finding]:
 
 
 def _both(log: Log, i: int, factor: float, ratio: float) -> Finding:
-    """Return the finding where reference and position agree: the torque, or the unit of both."""
+    """Return the finding for equal factors of reference and position: the torque's unit, or that of both others."""
     if _within(factor, _OTHER_GAINS):
         return _scaled(log, i, "torque", factor, ratio, severity="flag")
     if scale_name("position", 1.0 / factor, ratio) in _ANGLES:
@@ -182,7 +184,7 @@ def _shifted(log: Log, axis: _Axis, shifts: list[Shift | None]) -> list[Finding]
         f"{100 * max(axis.as_given.explained, 0):.3g} %. Shift it back, or record on one clock"
     )
     column = _column(shift.field, axis.index)
-    # On a smooth motion, of which nearly all is explained as given, other gains look like a shift.
+    # On a smooth motion that the law explains nearly as given, other gains look like a shift.
     doubtful = abs(shift.seconds) <= _LATE_S or axis.as_given.explained > _EXPLAINED
     severity: GateSeverity = "flag" if doubtful else "refuse"
     return [Finding(name, severity, message, log.name, axis.index + 1, column)]

@@ -1,14 +1,14 @@
-"""The torque that the controller of a robot file gives along logged references and positions.
+"""The torque that the controller of a robot file commands along logged references and positions.
 
-A controller is algebra, whatever the machine: the command is ``u_ff`` plus a linear function of
-references and measured positions that the log holds itself. Friction, payload, springs or a delay
-change the motion, and the command follows from the motion all the same. So the regression
+The command is an offset plus a linear function of references and measured positions, which the log contains.
+Friction, payload, springs or a delay change the motion, but the command still follows from the motion. So
+consider the regression
 
-    torque_i = a u_ref,j + b u_pos,k + c
+``torque_i = a u_ref,j + b u_pos,k + c``
 
-of a logged torque on the share of the reference of axis j and the share of the position of axis k
-has a = b = 1 and no error for j = k = i, and tells factors, signs, swapped columns and shifts of time
-apart from anything a machine may do. A limit after the controller shows as flat tops, left out.
+of a logged torque on the parts from the reference of axis j and the position of axis k. For j = k = i it has a
+= b = 1 and no error. This separates wrong factors, signs, columns and times from any effect in the machine. A
+limit after the controller makes flat tops, which are left out.
 """
 
 from __future__ import annotations
@@ -25,22 +25,24 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Compared up to here, or a fifth of the Nyquist frequency: above, drives filter what they report.
+# Upper end of the compared band [Hz], and as a share of the Nyquist frequency; the lower one counts. Drives
+# filter the torques that they report above. And samples compared in a period of the upper end.
 _BAND_HZ = 60.0
 _SHARE_OF_NYQUIST = 0.2
 _SAMPLES_PER_BAND = 6
-# A limit cuts for the time, too, that the low-pass smears it over.
+# Time around a limit that is left out, in periods of the band's upper end: the low-pass smears the limit that
+# far.
 _SMEARED_PERIODS = 1.0
-# Less is left to compare than a limit leaves out: nothing is said.
+# Smallest share of the samples that must remain for a result.
 _LEAST_KEPT = 0.1
 
 
 @dataclass(frozen=True)
 class LawFit:
-    """A regression of torque on the shares of a reference and a position.
+    """A regression of torque on the parts from a reference and a position.
 
-    ``explained``: share of the variance [1]; ``reference``, ``position``: factors a and b, NaN where
-    that share does not move.
+    ``explained``: share of the variance [1]; ``reference``, ``position``: factors a and b, NaN for a part that
+    is constant.
     """
 
     explained: float
@@ -49,9 +51,9 @@ class LawFit:
 
 
 class ControlLaw:
-    """The shares of references and positions in the commands of one log, low-passed.
+    """The parts of references and positions in the commands of one log, low-passed.
 
-    ``step``: every so many samples are compared; ``kept`` (n, n_axes): samples that no limit cut.
+    ``step``: every ``step``-th sample is compared; ``kept`` (n, n_axes): samples away from any limit.
     """
 
     def __init__(self, robot: Robot, log: Log) -> None:
@@ -74,7 +76,7 @@ class ControlLaw:
         self.kept = np.column_stack([free_of_limits(x, width) for x in log.torque_nm.T])
 
     def share(self, kind: str, axis: int, source: int) -> Array:
-        """Return what channel ``source`` adds to the command of ``axis``, (n,) [Nm], from 0.
+        """Return the part of channel ``source`` in the command of ``axis``, (n,) [Nm]; axes from 0.
 
         ``kind``: ``reference`` or ``position``.
         """
@@ -96,10 +98,10 @@ class ControlLaw:
         gains: int | None = None,
         shifts: tuple[int, int, int] = (0, 0, 0),
     ) -> LawFit:
-        """Regress the torque of ``axis`` on a reference and a position, axes from 0.
+        """Regress the torque of ``axis`` on a reference and a position; axes from 0.
 
-        ``gains``: of which axis, its own by default; ``shifts``: samples by which torque, reference and
-        position are read later.
+        ``gains``: the axis whose gains are used, by default ``axis``; ``shifts``: samples by which torque,
+        reference and position are read later.
         """
         own = axis if gains is None else gains
         reach = max(abs(s) for s in shifts)

@@ -1,8 +1,8 @@
-"""Whether positions follow their references, where the controller's law says nothing.
+"""Checks whether positions follow their references, where the controller's law does not explain the torque.
 
-The law says nothing where the machine has another controller than the robot file, or where the logged torque
-is not the command. One fact remains: a controlled axis follows its reference. The low-passed derivative of its
-position has the size and the sign of the reference.
+The machine may have another controller than the robot file, or a torque that is not the command. Even so, a
+controlled axis follows its reference: the low-passed derivative of its position equals the reference, in size
+and sign.
 """
 
 from __future__ import annotations
@@ -20,20 +20,22 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# References and positions are compared below this frequency [Hz]: loops of arms follow up to some ten hertz.
+# Upper end of the compared band [Hz]: loops of arms follow up to some ten hertz.
 _BAND_HZ = 20.0
-# An axis at a torque limit for most of a log still correlates with its reference by 0.94.
+# Correlation from which a position follows a reference. An axis at its torque limit for most of a log has 0.94.
+# And range of the ratio of reference to speed that is no finding.
 _FOLLOWS = 0.9
 _SIZE = (0.5, 2.0)
-# Mean square of what is left of the speed after the reference is taken off, relative to the speed's.
+# Mean square of speed minus reference, relative to the speed's, below which they are alike, and above which
+# not.
 _ALIKE = 0.15
 _UNLIKE = 0.5
 
 
 def check_follows(robot: Robot, log: Log, axes: Sequence[int]) -> list[Finding]:
-    """Return findings about positions that follow no reference, another's, or a multiple of it.
+    """Return findings about positions that follow no reference, another one, or a multiple of it.
 
-    ``axes`` (from 0): those to look at.
+    ``axes`` (from 0): the axes to check.
     """
     reference = log.velocity_ref_rad_s
     if reference is None or not axes:
@@ -54,7 +56,7 @@ def check_follows(robot: Robot, log: Log, axes: Sequence[int]) -> list[Finding]:
 
 
 def _left(log: Log, reference: Array) -> Array:
-    """Return what is left of the speed of axis i without reference j, (n_axes, n_axes), relative."""
+    """Return the mean square of the speed of axis i minus reference j, over that speed's (n_axes, n_axes)."""
     band = min(_BAND_HZ, 0.2 / log.sample_time_s)
     speed, _ = differentiate(log.position_rad, log.sample_time_s, band)
     given = lowpass(reference, log.sample_time_s, band)

@@ -1,4 +1,4 @@
-"""Whether positions follow their targets, where no torque tells whose they are."""
+"""Checks whether positions follow their targets, in logs without torque."""
 
 from __future__ import annotations
 
@@ -12,24 +12,26 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Correlation from which a position is that of a target, and how late it may be [s]: loops may be soft.
+# Correlation from which a position follows a target, and largest delay of it [s], since loops may be soft. And
+# range of the ratio of position to target that is no finding.
 _FOLLOWS = 0.9
 _LATE_S = 0.3
 _SIZE = (0.5, 2.0)
-# Mean square of what is left of a position without a target, both less their means, relative to the position's.
+# Mean square of position minus target, without means and relative to the position's, below which they are
+# alike, and above which not.
 _ALIKE = 0.15
 _UNLIKE = 0.5
 
 
 def check_follows_target(robot: Robot, log: Log) -> list[Finding]:
-    """Return findings about positions that follow no target but another's, run against it, or a multiple of it."""
+    """Return findings about positions that follow another axis' target, or their own by a wrong factor or sign."""
     if log.position_ref_rad is None or log.n_axes != robot.n_axes:
         return []
     position, target = log.position_rad, log.position_ref_rad
     lags = range(min(round(_LATE_S / log.sample_time_s), log.n_samples // 2) + 1)
     left, ratio = zip(*(_followed(position, target, lag) for lag in lags), strict=True)
     least = np.min(left, axis=0)
-    # Of each position and its own target, where they are most alike.
+    # Correlation of each position with its own target, at the lag where it is largest.
     own = np.array([np.diag(r) for r in ratio])
     best = np.abs(own).argmax(axis=0)
     out = []
@@ -46,7 +48,10 @@ def check_follows_target(robot: Robot, log: Log) -> list[Finding]:
 
 
 def _followed(position: Array, target: Array, lag: int) -> tuple[Array, Array]:
-    """Return what is left of position i without target j, ``lag`` samples before, and their correlations."""
+    """Return the relative mean square of position i minus target j, ``lag`` samples earlier, and the correlations.
+
+    Both (n_axes, n_axes).
+    """
     x, y = position[lag:], target[: len(target) - lag]
     x, y = x - x.mean(axis=0), y - y.mean(axis=0)
     power, given = (np.maximum((z**2).mean(axis=0), 1e-300) for z in (x, y))
@@ -56,7 +61,7 @@ def _followed(position: Array, target: Array, lag: int) -> tuple[Array, Array]:
 
 
 def _size(position: Array, target: Array, lag: int) -> float:
-    """Return how many times as large a position is as its target (n,)."""
+    """Return the ratio of a position to its target (n,), by least squares."""
     x, y = position[lag:], target[: len(target) - lag]
     x, y = x - x.mean(), y - y.mean()
     return float(x @ y / max(float(y @ y), 1e-300))

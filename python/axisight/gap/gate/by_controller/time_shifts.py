@@ -1,4 +1,4 @@
-"""Channels of a log on different clocks, by the controller's law."""
+"""Finds channels of a log on different clocks, by the controller's law."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 
 from axisight.gap.gate.by_controller.control_law import ControlLaw, LawFit
 
-# Looked for up to here, or a tenth of the log.
+# Largest shift that is tried [s]; at most a tenth of the log.
 _REACH_S = 0.25
-# Channels of one drive arrive within a sample or two of one another; less than this is no fault.
+# Smallest shift that is a fault [s]: channels of one drive arrive within a sample or two.
 _LEAST_S = 3e-3
-# A shift that is the mistake leaves next to nothing; on smooth motions other gains look like one, and
-# leave a third.
+# Largest share of the law's error that the shift may leave. A true shift leaves almost nothing; other gains on
+# a smooth motion look like a shift, and leave a third.
 _LEFT = 0.1
 
 
 @dataclass(frozen=True)
 class Shift:
-    """A channel that is late (positive) or early, and the law's fit without that."""
+    """A channel that is late (positive) or early, and the law's fit with the shift undone."""
 
     field: str
     seconds: float
@@ -28,9 +28,9 @@ class Shift:
 
 
 def best_shift(law: ControlLaw, axis: int, believed: Callable[[LawFit], bool]) -> Shift | None:
-    """Return the shift of one channel of ``axis`` (from 0) that makes the law hold, or None.
+    """Return the shift of one channel of ``axis`` (from 0) with which the law holds; None without one.
 
-    ``believed``: whether a fit is as good as that of a law that holds.
+    ``believed``: whether a fit is as good as for a law that holds.
     """
     reach = min(int(_REACH_S / law.sample_time_s), len(law.torque) // 10)
     given = law.fit(axis, axis, axis)
@@ -39,7 +39,7 @@ def best_shift(law: ControlLaw, axis: int, believed: Callable[[LawFit], bool]) -
     best: Shift | None = None
     for place, field in enumerate(("torque", "velocity_ref", "position")):
         if not moves[place]:
-            # A channel that stands is nowhere late: the law holds once the start is left out.
+            # A constant channel has no delay; without the start of the log the law would hold at any lag.
             continue
         lag, fit = _best_lag(law, axis, place, range(-reach, reach + 1, law.step))
         lag, fit = _best_lag(law, axis, place, range(lag - law.step, lag + law.step + 1))

@@ -1,1 +1,1 @@
-"""Logs against the simulator's inverse dynamics: columns, signs, units, clocks."""
+"""Checks logs against the simulator's inverse dynamics: columns, signs, units, clocks."""

@@ -1,8 +1,7 @@
-"""Friction takes energy: an axis whose friction would drive has a column with the wrong sign.
+"""Finds axes with a wrong sign from their friction, which must take energy.
 
-On an axis that carries little load the torque is mostly friction, of which a simulator may have none;
-then no comparison with it shows a sign. Energy does: what the motor puts in beyond what the simulator's
-bodies take is heat.
+On an axis with little load the torque is mostly friction. If the simulator has none, comparing torques shows no
+sign. Energy does: the motor's work beyond that on the simulator's bodies must become heat.
 """
 
 from __future__ import annotations
@@ -18,13 +17,14 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Net work as a share of all the work done either way. An unknown load that a log raises or lowers
-# shows here too, but as a share of the gravity it adds; three tenths of payload stay below this.
+# Net work, as a share of all work in either direction, below which friction seems to drive. An unknown load that a
+# log lowers also gives a negative share, as large as the share of gravity that the load adds; 30 % does not reach
+# the limit.
 _DRIVES = -0.5
 
 
 def check_passive(robot: Robot, log: Log, at: Motion) -> list[Finding]:
-    """Return findings about axes on which friction would drive; motion and torque as low-passed."""
+    """Return findings about axes whose friction seems to drive; ``at``: low-passed motion and torque."""
     bodies = predict(_without_friction(robot), at)
     power = (at[3] - bodies) * at[1]
     scale = np.abs(at[3] * at[1]).sum(axis=0)

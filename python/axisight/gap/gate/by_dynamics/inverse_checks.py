@@ -1,4 +1,4 @@
-"""Logs without a controller against the simulator's inverse dynamics: columns, signs, units, time."""
+"""Checks logs without a controller against the simulator's inverse dynamics: columns, signs, units, time."""
 
 from __future__ import annotations
 
@@ -20,26 +20,28 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Motions of arms lie below; what a gate looks for shows there.
+# Cutoff [Hz] of the low-pass before the checks: motions of arms lie below. And samples kept in a period of the
+# cutoff.
 _BAND_HZ = 10.0
 _SAMPLES_PER_BAND = 10
-# With friction and offset granted, simulators of real machines leave a tenth or less of the torque's
-# variance; with a third left on an axis, mistakes are looked for.
+# Unexplained share of an axis' torque variance from which mistakes are looked for. With friction and offset in
+# the regression, simulators of real machines leave 10 % or less.
 _SUSPICIOUS = 0.3
-# A mistake is named where undoing it takes off half of what was left on all axes, no less than so
-# much of one axis, and explains the axes concerned as simulators do.
+# Conditions for naming a mistake. Undoing it must remove half of the unexplained share, summed over the axes,
+# and at least 8 % of one axis' variance. And it must leave less than 30 % on the axes concerned.
 _REMOVED = 0.5
 _LEAST_REMOVED = 0.08
 _EXPLAINED = 0.3
-# A factor of the torque is known where the prediction carries so much of its variance.
+# Share of the torque's variance that the prediction must explain beyond friction for its factor to be known.
 _CARRIES = 0.1
-# A load or gravity that is compensated in the arm changes torques by up to two; more is worth a word.
-# On a wrist a heavy tool changes them by five and more, but not on all axes; by thirty nowhere.
+# Ranges of the factor of the torque that are no finding, no refusal on all axes, and no refusal of a unit on
+# one axis. A load or gravity that is compensated in the arm changes torques by up to two. A heavy tool changes
+# them by five and more on a wrist, not on all axes, and never by thirty.
 _SAME = (0.4, 2.5)
 _ALL_AXES = (0.25, 4.0)
 _ONE_AXIS = (1 / 30.0, 30.0)
 _FASTEST_RAD_S = 3000.0
-"""A motor faster than 28 600 rpm is one whose position is in counts."""
+"""Motor speed [rad/s], 28 600 rpm, above which a position is in encoder counts."""
 
 
 def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
@@ -54,7 +56,7 @@ def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
 
 
 def thinned(log: Log) -> tuple[float, Motion]:
-    """Return sample time [s] and motion of a log, low-passed at 10 Hz and thinned as that allows."""
+    """Return sample time [s] and motion of a log, low-passed at 10 Hz or less and thinned accordingly."""
     band = min(_BAND_HZ, highest_cutoff_hz(log.sample_time_s))
     step = max(1, int(1.0 / (_SAMPLES_PER_BAND * band * log.sample_time_s)))
     position, speed, acceleration, torque = (x[::step] for x in motion(log, band))
@@ -89,7 +91,7 @@ def _too_fast(robot: Robot, log: Log, at: Motion) -> list[Finding]:
 
 
 def _most_likely(robot: Robot, at: Motion, given: TorqueFit) -> Mistake | None:
-    # Positions scaled to next to nothing would leave nothing but a prediction times a thousand.
+    # Positions in a far too small unit would leave only a prediction times a thousand.
     sound = (mistake for mistake in undone(robot, at) if _in_scale(mistake.fit))
     best = min(sound, key=lambda mistake: mistake.fit.total, default=None)
     if best is None:
@@ -102,7 +104,7 @@ def _most_likely(robot: Robot, at: Motion, given: TorqueFit) -> Mistake | None:
 
 
 def _gravity_off(robot: Robot, motions: Sequence[tuple[float, Motion]]) -> bool:
-    """Whether gravity turned round explains every log that feels it: the logs have it in common."""
+    """Whether gravity with the other sign explains all logs in which gravity matters."""
     for _, at in motions:
         given = torque_fit(at[3], predict(robot, at), at).total
         removed = given - gravity_turned(robot, at).total
@@ -112,7 +114,7 @@ def _gravity_off(robot: Robot, motions: Sequence[tuple[float, Motion]]) -> bool:
 
 
 def _in_scale(fit: TorqueFit) -> bool:
-    """Whether the torques that a prediction carries are of its size, loads that it lacks granted."""
+    """Whether the factors of predicted torques are plausible, with loads that the prediction lacks."""
     slope = np.abs(fit.slope[fit.gain > _CARRIES])
     return bool(np.all((slope > _ONE_AXIS[0]) & (slope < _ONE_AXIS[1])))
 

@@ -1,14 +1,8 @@
-"""Small errors of a log by the simulator's inverse dynamics: clocks apart, encoders off their zero.
+"""Finds small errors of logs by the simulator's inverse dynamics: clocks apart, encoders off their zero.
 
-Each error changes the predicted torque in proportion to its size:
-
-| error | change of the torque |
-|---|---|
-| a late torque | its rate times the delay |
-| an axis that is late | the effect of its motion during the delay on the torques of all axes |
-| an encoder off its zero | that of gravity in the turned pose |
-
-One regression estimates them all, beside a factor of the prediction, friction and an offset on every axis.
+All of them act to first order. A late torque changes by its rate times the delay. A late axis changes the
+torques of other axes by its motion in that time. An encoder off its zero turns gravity. One regression
+estimates all of them, beside a factor of the prediction, friction and an offset on each axis.
 """
 
 from __future__ import annotations
@@ -27,29 +21,32 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Steps of the differences that give the first-order effects: of the size that is looked for.
+# Steps of the differences for the first-order effects [s, rad joint side], as large as the errors looked for.
 _STEP_S = 0.02
 _STEP_RAD = 0.05
-# What is worth a word: above the skew of real recorders (a few ms) and the play of zero marks.
+# Smallest errors that are a finding [s, rad joint side], above the skew of real recorders (a few ms) and the
+# play of zero marks.
 _LEAST_S = 8e-3
 _LEAST_RAD = 0.03
-# What is larger is not of first order, and something else.
+# Largest errors [s, rad joint side]; larger ones are not of first order, and have another cause.
 _MOST_S = 0.2
 _MOST_RAD = 0.6
-# By itself it has to take so much of what is left, and stand out of its scatter between tenths of
-# the log: payloads and friction of another shape take less, or not evenly.
+# Smallest share of the remaining error that one error must explain, and smallest significance [standard
+# errors], from the scatter between ten parts of each log. Payloads and other laws of friction explain less, or
+# not evenly.
 _REMOVED = 0.05
 _SIGNIFICANT = 6.0
 _PARTS = 10
-# Logs with less than a tenth of the effect of the strongest say nothing; the others agree this well.
+# Logs with less than a tenth of the largest effect are not compared; the ratio of the others' estimates to that
+# of all logs must lie in this range.
 _TELLS = 0.1
 _ALIKE = (0.5, 2.0)
 
 
 def check_small_errors(robot: Robot, motions: Sequence[tuple[float, Motion]]) -> list[Finding]:
-    """Return flags about the time of torques, the time of single axes and their zero.
+    """Return flags about the time of torques, and the time and zero of single axes.
 
-    ``motions``: sample time [s] and low-passed motion of every log; an error has to be in all of them.
+    ``motions``: sample time [s] and low-passed motion of each log; all logs must show an error.
     """
     parts = []
     names: list[tuple[str, int]] = []
@@ -60,7 +57,7 @@ def check_small_errors(robot: Robot, motions: Sequence[tuple[float, Motion]]) ->
     targets = [target for target, _ in parts]
     limits = [_MOST_RAD if kind == "position_offset" else _MOST_S for kind, _ in names]
     out = []
-    # The one that takes most first; the others on what it leaves.
+    # The error that explains most comes first; the others must explain the rest.
     for _ in range(len(names)):
         columns = [[part[i] for _, part in parts] for i in range(len(names))]
         best = _strongest(targets, columns, limits)
@@ -78,13 +75,13 @@ def check_small_errors(robot: Robot, motions: Sequence[tuple[float, Motion]]) ->
 def _effects(
     robot: Robot, sample_time_s: float, at: Motion, base: Array
 ) -> tuple[list[tuple[str, int]], list[Array]]:
-    """Return what each error adds to the measured torque, per unit, (n, n_axes) each."""
+    """Return the change of the measured torque by each error, per unit, (n, n_axes) each."""
     position, speed, acceleration, torque = at
     n = robot.n_axes
     step = max(1, round(_STEP_S / sample_time_s))
     seconds = step * sample_time_s
     names: list[tuple[str, int]] = [("time_shifted", -1)]
-    # Torque read late by s is the torque of s earlier.
+    # A torque that is s late is the torque s earlier.
     effects = [-np.gradient(torque, sample_time_s, axis=0)]
     rate = np.gradient(base, sample_time_s, axis=0)
     for i in range(n):
@@ -93,12 +90,12 @@ def _effects(
         moved = [
             predict(robot, (position + s * turn, speed, acceleration, torque)) for s in (1.0, -1.0)
         ]
-        # The encoder shows more than there is: the machine's torque is that of less.
+        # The encoder shows more than the angle: the machine's torque is that of a smaller angle.
         names.append(("position_offset", i))
         effects.append((moved[1] - moved[0]) / (2 * _STEP_RAD))
         late = [predict(robot, _shifted(at, i, s * step)) for s in (1, -1)]
-        # Its columns are late: the machine was further on. Its own torque is late too, and so are
-        # motion and friction it goes with; only the other axes were further on then.
+        # The columns of the axis are late: the machine was further on. The other axes have the torque of the
+        # later position. The axis' own torque is as late as its motion and friction.
         effect = (late[0] - late[1]) / (2 * seconds)
         effect[:, i] -= rate[:, i]
         names.append(("axis_delayed", i))
@@ -118,7 +115,7 @@ def _shifted(at: Motion, axis: int, samples: int) -> Motion:
 
 
 def _projected(at: Motion, base: Array, effects: list[Array]) -> tuple[Array, list[Array]]:
-    """Return torque and effects (n, n_axes) without factor, friction and offset, axes weighted alike."""
+    """Return torque and effects (n, n_axes) without factor, friction and offset, over each axis' torque scatter."""
     torque = at[3]
     target = np.empty_like(torque)
     columns = [np.empty_like(torque) for _ in effects]
@@ -134,7 +131,7 @@ def _projected(at: Motion, base: Array, effects: list[Array]) -> tuple[Array, li
 
 @dataclass(frozen=True)
 class _Strongest:
-    """An error by its number, its size, the share of what is left that it takes, its significance."""
+    """An error by its index, its size, the share of the remaining error that it explains, and its significance."""
 
     index: int
     size: float
@@ -145,15 +142,15 @@ class _Strongest:
 def _strongest(
     targets: list[Array], columns: list[list[Array]], limits: list[float]
 ) -> _Strongest | None:
-    """Return what takes most of the targets, within limits and alike in all logs.
+    """Return the error that explains most of the targets, within its limit and alike in all logs; None without one.
 
-    ``targets`` and every one of ``columns`` hold an array per log.
+    ``targets`` and each of ``columns`` contain one array for each log.
     """
     power = sum(float((t**2).sum()) for t in targets)
     best = None
     for index, column in enumerate(columns):
-        # Energies of ten parts of every log: the scatter of the estimate between them (the
-        # sandwich of one number) is its error.
+        # The estimate's error is its scatter between ten parts of each log (sandwich estimate for one
+        # parameter).
         cells = [
             [
                 (float((c * t).sum()), float((c * c).sum()))
@@ -180,7 +177,7 @@ def _cut(x: Array) -> list[Array]:
 
 
 def _alike(per_log: Array, size: float) -> bool:
-    """Whether every log that tells (its product and energy are a row) tells about the same size."""
+    """Whether all logs with a large enough effect give about the same size; rows: product and energy of a log."""
     tells = per_log[:, 1] > _TELLS * per_log[:, 1].max()
     ratio = per_log[tells, 0] / per_log[tells, 1] / (size or 1.0)
     return bool(np.all((ratio > _ALIKE[0]) & (ratio < _ALIKE[1])))

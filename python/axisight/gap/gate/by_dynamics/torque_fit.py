@@ -1,4 +1,4 @@
-"""How well a predicted torque explains a logged one, friction and offset granted."""
+"""Regresses a logged torque on a predicted one, with friction and an offset."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from axisight.gap.signals.motion import Motion
 
 Array = NDArray[np.float64]
 
-# Corner of the sign of the speed, as a share of the largest speed.
+# Speed where the smoothed sign turns, as a share of the largest speed.
 _CORNER = 0.02
 
 
 @dataclass(frozen=True)
 class TorqueFit:
-    """A regression of torques on predicted ones, axis by axis; arrays are (n_axes,).
+    """A regression of torques on predicted ones, by axis; arrays are (n_axes,).
 
-    ``slope``: factor of the predicted torque; ``left``: share of the variance that is left when the
-    factor has to be positive; ``left_turned``: when it has to be negative; ``gain``: share of the
-    variance that the prediction takes beyond friction and an offset.
+    - ``slope``: factor of the predicted torque.
+    - ``left``: unexplained share of the variance with a positive factor.
+    - ``left_turned``: the same with a negative factor.
+    - ``gain``: share of the variance that the prediction explains beyond friction and an offset.
     """
 
     slope: Array
@@ -31,18 +32,18 @@ class TorqueFit:
 
     @property
     def total(self) -> float:
-        """Sum of what is left over axes."""
+        """Unexplained share, summed over the axes."""
         return float(self.left.sum())
 
 
 def nuisance(speed: Array) -> Array:
-    """Return speed, its sign and one, (n, 3): what friction and a torque offset may add."""
+    """Return speed, its smoothed sign and one, (n, 3): the columns of friction and a torque offset."""
     corner = _CORNER * max(float(np.abs(speed).max()), 1e-12)
     return np.column_stack([speed, speed / np.hypot(speed, corner), np.ones(len(speed))])
 
 
 def torque_fit(torque: Array, predicted: Array, at: Motion) -> TorqueFit:
-    """Regress every column of ``torque`` (n, n_axes) on that of ``predicted``, speeds from ``at``."""
+    """Regress each column of ``torque`` (n, n_axes) on that of ``predicted``, with speeds from ``at``."""
     rows = [_one(torque[:, i], predicted[:, i], at[1][:, i]) for i in range(torque.shape[1])]
     slope, left, turned, gain = (np.array(column) for column in zip(*rows, strict=True))
     return TorqueFit(slope, left, turned, gain)

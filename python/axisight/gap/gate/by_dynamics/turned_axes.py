@@ -1,7 +1,7 @@
-"""An axis that turns the other way in the simulator than in the machine.
+"""Finds an axis that turns the other way in the simulator than in the machine.
 
-Position and torque of its motor change sign together, and so do its references: no law of a controller shows it,
-nor does friction. Gravity and what couples the axes do.
+Position, torque and references of its motor all change sign, so neither a controller's law nor friction shows
+it. Gravity and the coupling of the axes do.
 """
 
 from __future__ import annotations
@@ -18,17 +18,21 @@ from axisight.gap.signals.motion import Motion
 from axisight.logs import Log
 from axisight.robot import Robot
 
-# Turned round, a log is explained that was not: no more than so much of the variance of any axis is left, a quarter
-# of what was left of all axes, and two hundredths less. What a simulator lacks is not made good by another direction.
+# Conditions for a log to show a turned axis. Turned, it leaves less than 30 % of any axis' variance, less than
+# a quarter of the unexplained share before, summed over the axes, and at least 2 % less. An effect that the
+# simulator lacks does not vanish with a turned axis.
 _EXPLAINED = 0.3
 _LEFT = 0.25
 _LEAST_REMOVED = 0.02
-# No log is explained worse by more than this: those that hardly couple the axes say nothing.
+# Largest increase of the summed unexplained share in any log; logs that hardly couple the axes show nothing.
 _NO_WORSE = 0.005
 
 
 def check_turned_axes(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
-    """Return the finding about the axis that explains most of the logs (at least one) once it is turned round."""
+    """Return the finding about the axis that, turned round, explains the logs; empty without one.
+
+    At least one log must show it, and none may be explained worse.
+    """
     motions = [thinned(log)[1] for log in logs]
     given = [torque_fit(at[3], predict(robot, at), at) for at in motions]
     if sum(g.total for g in given) < _LEAST_REMOVED:

@@ -1,4 +1,4 @@
-"""Mistakes that are undone one at a time, to see whether the simulator then explains the torques."""
+"""Undoes possible mistakes one at a time, to see whether the simulator then explains the torques."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# What a position in a wrong unit has to be multiplied by [rad].
+# Factor that turns a position in a wrong unit into rad.
 _UNITS = {
     "position_in_degrees": math.pi / 180.0,
     "position_in_revolutions": 2.0 * math.pi,
     "position_in_mrad": 1e-3,
 }
-# Different enough from one that another side of the gear is another simulator.
+# Smallest logarithm of a gear ratio for which the two sides of the gear differ.
 _GEARED = 0.1
 
 
 @dataclass(frozen=True)
 class Mistake:
-    """A mistake that may have been made, and how well the torques are explained without it.
+    """A possible mistake, and how well the torques are explained without it.
 
-    ``axes``: those concerned, from 0; ``field``: column stem or key of the robot file.
+    ``axes``: the axes concerned, from 0; ``field``: column stem or key of the robot file.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Mistake:
 
 
 def undone(robot: Robot, at: Motion) -> Iterator[Mistake]:
-    """Yield every single mistake, undone: swapped and turned columns, units, gravity."""
+    """Yield each single mistake, undone: swapped and turned columns, units, gravity."""
     position, speed, acceleration, torque = at
     n = robot.n_axes
     given = predict(robot, at)
@@ -85,7 +85,7 @@ def predict(robot: Robot, at: Motion) -> Array:
 
 
 def gravity_turned(robot: Robot, at: Motion) -> TorqueFit:
-    """Fit with gravity of the other sign: what the same motion without speed takes, off twice."""
+    """Fit with gravity of the other sign: the prediction minus twice the torque at zero speed."""
     still = np.zeros_like(at[1])
     weight = predict(robot, (at[0], still, still, at[3]))
     return torque_fit(at[3], predict(robot, at) - 2.0 * weight, at)
