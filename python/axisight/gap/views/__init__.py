@@ -1,1 +1,1 @@
-"""What is compared: torque in closed loop, torque by inverse dynamics, positions under targets."""
+"""The three comparisons: torque in closed loop, torque by inverse dynamics, positions under targets."""

@@ -1,4 +1,4 @@
-"""The one place that decides how simulator and logs are compared."""
+"""Chooses how simulator and logs are compared."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ def view_of(
     settings: Settings,
     commanded: Commanded | None = None,
 ) -> View:
-    """Return closed loop if robot and all logs have what it takes, else inverse dynamics.
+    """Return the closed-loop view if the robot and all logs allow it, else inverse dynamics.
 
-    ``commanded``: where no torque was logged; the logs are then among those of it.
+    ``commanded``: given if no torque was logged; then positions are compared, and all logs belong to
+    ``commanded``.
     """
     if commanded is not None:
         return TargetsView(commanded, list(estimation), settings)

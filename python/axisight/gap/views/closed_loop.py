@@ -1,4 +1,4 @@
-"""Closed-loop mode: simulator and machine under the same references and controller."""
+"""Closed-loop comparison: simulator and machine under the same references and controller."""
 
 from __future__ import annotations
 
@@ -41,26 +41,25 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-# Speed of the loop that keeps a simulator on a log, relative to the machine's own. Any loop will do
-# where all is linear: weights undo its response. But with lost motion or stiction in the model a
-# tight one chatters: widths of a play two thousandths apart differ by a third in loss, which in
-# a loop of a third of the speed is all but smooth. Slower still, the simulator strays from
-# the log by more than waves of a ripple are long.
+# Speed of the loop that keeps a simulator on a log, relative to the machine's loop. In a linear model any loop
+# will do, since the weights undo its response. With lost motion or stiction a tight loop chatters: the losses
+# of two plays 0.2 % apart differ by a third, while a loop of a third of the speed is almost smooth. In a still
+# slower loop the simulator strays from the log by more than the length of a ripple.
 TRACKING_SPEED = 1 / 3
 
-# Position [rad] and torque [Nm] of a log (lead + n, n_axes), its certainty (n, n_axes), the joint angles
-# where its run begins [rad], (n_axes,), None at the operating point, and how many samples lead to it.
+# Position [rad] and torque [Nm] of a log (lead + n, n_axes); its certainty (n, n_axes); the joint angles where
+# its simulation starts [rad], (n_axes,), None at the operating point; and the number of samples in its run-up.
 Record = tuple[Array, Array, Array, Array | None, int]
 
 
 class ClosedLoopView(View):
-    """Simulator and machine driven by the same references."""
+    """Compares the torques of simulator and machine under the same references."""
 
     fitter: ClosedLoopFitter
 
     def __init__(self, robot: Robot, logs: list[Log], settings: Settings) -> None:
         slow = with_integral(robot).with_controller_speed(TRACKING_SPEED)
-        # What keeps a simulator on a log acts on its motors at once.
+        # The torque that keeps a simulator on a log acts on its motors without a lag.
         self.tracking = slow.with_effects([e for e in robot.effects if not is_lag(e)])
         limits = torque_limits(robot, logs)
         others = other_controllers(robot, logs)
@@ -68,7 +67,7 @@ class ClosedLoopView(View):
         self._noisy = robot.with_effects([*robot.effects, *(x.effect for x in others)])
         self._step_rad = encoder_steps(robot, logs)
         floor, self._weights = tracking_floor(self.tracking, self._noisy, logs, settings)
-        # A torque reported after the limit is what the motor got: it needs no limit once more.
+        # A torque that is reported after the limit is the motor's torque: limiting it again would be wrong.
         after = {limit.effect.label for limit in limits}
         own = [e for e in robot.effects if e.label not in after]
         kept_on_log = slow.with_effects(own)
@@ -83,10 +82,10 @@ class ClosedLoopView(View):
         self._loops: dict[tuple[int, float], tuple[Complex, Complex]] = {}
 
     def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
-        """Return the response of the feedback that keeps the simulator on the log.
+        """Return the response (n_freq,) of the feedback that keeps the simulator on the log to an effect.
 
-        An error of the sensor passes the controller and the sensitivity, ``F (I + G F)^-1``; a torque
-        on the motor passes the machine before, and an error of the gear becomes one.
+        An error of the sensor passes the controller and the sensitivity, ``F (I + G F)^-1``. A torque on the
+        motor passes the machine first. An error of the gear acts as such a torque.
         """
         loops = self._loop(frequency_hz)
         return periodic_response(self.tracking, effect, axis, loops, frequency_hz)
@@ -99,37 +98,37 @@ class ClosedLoopView(View):
         return self._loops[key]
 
     def measured(self, log: Log) -> Array:
-        """Return the logged torque."""
+        """Return the logged torque (n, n_axes) [Nm]."""
         return log.torque_nm
 
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
-        """Return the simulated torque of every log."""
+        """Return the simulated torque of each log (n, n_axes) [Nm]."""
         out = simulated_torques(self.robot, variant, logs, threads=self.settings.threads)
         return [self._reported(torque, variant) for torque in out]
 
     def run(self, variant: Variant, log: Log) -> tuple[Array, Array]:
-        """Return torque and position of the simulator on one log."""
+        """Return torque [Nm] and position [rad] of the simulator on one log, (n, n_axes) each."""
         torque, position = simulated_run(self.robot, variant, log)
         return self._reported(torque, variant), position
 
     def _reported(self, torque_nm: Array, variant: Variant) -> Array:
-        # An effect of a variant replaces the simulator's own.
+        # An effect of the variant replaces the simulator's own one.
         effects = {e.label: e for e in (*self.robot.effects, *variant.effects)}.values()
         return reported(torque_nm, self.limits, effects)
 
     def weighting_with(self, torque_nm: Array) -> Weighting:
-        """Return the weights that there would be with one more log, of this torque (n, n_axes)."""
+        """Return the weighting that results if a log with this torque (n, n_axes) [Nm] is added."""
         torques = [*(log.torque_nm for log in self.logs), torque_nm]
         weight = self._weights.of(torques, shortest(self.logs))
         return replace(self.floor.weighting, weight=weight)
 
     def followed(self, found: SearchState, logs: Sequence[Log]) -> float:
-        """Return the share of the explainable error that the causes remove where they are kept on ``logs``."""
+        """Return the share of the explainable error that the causes remove in a simulator kept on ``logs``."""
         there = self.fitter.along(records_of(self.tracking, logs, self.floor.weighting))
         before = there.loss([], found.baseline)
         left = there.loss(found.model.free, found.model)
         if isinstance(before, Diverged) or isinstance(left, Diverged):
-            # One of them cannot be kept there.
+            # A simulator that diverges cannot be kept on these logs.
             return 0.0
         noise = float(there.counted_by_axis() @ self.floor.expected)
         return (before - left) / max(before - noise, 1e-300)
@@ -137,10 +136,10 @@ class ClosedLoopView(View):
     def noises(
         self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
     ) -> list[Array]:
-        """Return the torque that sensor noise causes through the loop, for every log."""
+        """Return the torque (n, n_axes) [Nm] that sensor noise causes through the loop, for each log."""
         machine = with_values(self._noisy, variant.robot_values)
         effects = {e.label: e for e in (*machine.effects, *variant.effects)}.values()
-        # Steps are no white noise: what they make of a slow motion is run.
+        # Encoder steps are not white noise: noise_torques simulates them along the motion.
         stated = self.robot.position_noise_std
         return noise_torques(
             machine.with_effects(list(effects)),
@@ -153,7 +152,7 @@ class ClosedLoopView(View):
         )
 
     def sensor_noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
-        """Return the torque that noise of the stated sensor causes through the loop, for every log."""
+        """Return the torque (n, n_axes) [Nm] that the stated sensor's noise causes through the loop, for each log."""
         std = np.full(self.robot.n_axes, self.robot.position_noise_std)
         seed, threads = self.settings.seed, self.settings.threads
         return noise_torques(self._noisy, logs, std, seed, first_run, threads=threads)
@@ -163,16 +162,16 @@ def _contiguous(x: Array) -> Array:
     return np.ascontiguousarray(x, dtype=np.float64)
 
 
-# Of the low-pass that speeds are taken with, where noise of the sensor is no motion; and of the one
-# below which most arms are rigid.
+# Cutoffs [Hz] for speeds, where sensor noise is no motion, and for the torque of rigid bodies, below which most
+# arms are rigid.
 _SPEED_HZ = 20.0
 _RIGID_HZ = 5.0
 
 
 def certainties(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> list[Array]:
-    """Return how far a simulator can be asked to follow each sample of logs (n, n_axes).
+    """Return the certainty of each sample of logs (n, n_axes): how closely a simulator must follow it, from 0 to 1.
 
-    Where a motor stands or turns round, dry friction leaves its torque open: no two laws agree there.
+    It is lower where a motor stands or turns round: laws of dry friction differ there.
     """
     step_s = logs[0].sample_time_s
     highest = highest_cutoff_hz(step_s)
@@ -194,13 +193,13 @@ def certainties(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> l
     return out
 
 
-# Beginning of a log with a run-up that does not count [s]. Weights mirror an error there: of a log that
-# begins at rest it is none, in motion it is noise in mid-course, and counts twice.
+# Start of a log with a run-up that does not count [s]. The weighting mirrors the error at the start. A log from
+# rest has no error there; a log in motion has noise, which would count twice.
 _MIRRORED_S = 0.1
 
 
 def records_of(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> list[Record]:
-    """Return what a simulator that is kept on logs is compared with."""
+    """Return the records of logs with which a simulator kept on them is compared."""
     certain = certainties(tracking, logs, weighting)
     stepped = encoder_steps(tracking, logs) > 0
     forgets_s = _forgets_s(tracking) if stepped.any() else 0.0
@@ -214,14 +213,15 @@ def records_of(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> li
     return out
 
 
-# Of a log, what its beginning may be at most; and its end that does not count where positions come in steps [s],
-# for the same reason as `_MIRRORED_S`: the error of a position there is no smaller than half a step.
+# Longest start of a log that does not count, as a share of the log. And end that does not count if positions
+# come in steps [s], for the same reason as `_MIRRORED_S`: the error of a position there is at least half a
+# step.
 _MOST_FORGOTTEN = 0.25
 _END_S = 0.5
 
 
 def _at_edges(log: Log, forgets_s: float) -> NDArray[np.bool_]:
-    """Return which samples of a log are so near its beginning or its end that steps of an encoder do not tell."""
+    """Mark the samples (n,) at the start and end of a log that encoder steps make useless."""
     first_s = min(forgets_s, _MOST_FORGOTTEN * log.duration_s)
     time_s = np.arange(log.n_samples) * log.sample_time_s
     last_s = time_s[-1] - min(_END_S, _MOST_FORGOTTEN * log.duration_s)
@@ -229,28 +229,26 @@ def _at_edges(log: Log, forgets_s: float) -> NDArray[np.bool_]:
 
 
 def _forgets_s(tracking: Robot) -> float:
-    """Return for how long [s] a loop remembers where it began.
+    """Return how long [s] a loop remembers its initial state.
 
-    A motor that is held between two steps of its encoder swings between them before a log begins: nobody
-    knows with what speed it does begin.
+    A motor that is held between two encoder steps moves between them before a log starts. Its speed at the
+    start is unknown.
     """
     decay_1_s = slowest_decay_1_s(tracking, np.array(tracking.operating_point))
     return float(-np.log(FORGOTTEN) / decay_1_s) if decay_1_s > 0 else np.inf
 
 
-# Seconds that a log is not cut below.
+# Shortest start of a log that is fitted alone [s].
 _LEAST_S = 4.0
 
 
 class ClosedLoopFitter(ModelFitter):
-    """Torque that the controller's feedback must add to the logged one to keep the simulator on the log.
+    """Fits the torque that feedback must add to the logged torque to keep the simulator on the log.
 
-    In a linear loop this is the torque by which a run driven by the references
-    would be off; in a nonlinear one the simulator also stays in phase with the
-    log, without which lost motion and stiction have no smooth error to fit. The controller is
-    that of ``robot``, which need not be the machine's.
-    ``records``: position [rad] and torque [Nm] of each log, and how far a simulator can be asked to
-    follow it, (n, n_axes), where its run begins, and how many samples lead to it.
+    In a linear loop this is the torque error of a simulation driven by the references. In a nonlinear one the
+    feedback also keeps the simulator in phase with the log; else lost motion and stiction have no smooth error
+    to fit. The controller is that of ``robot``, which may differ from the machine's. ``records``: one `Record`
+    for each log.
     """
 
     driven_by: ClassVar[Literal["tracking", "reference"]] = "tracking"
@@ -269,7 +267,7 @@ class ClosedLoopFitter(ModelFitter):
         self.simulated = self._made_ready()
 
     def _made_ready(self) -> _core.SimulatedLogs:
-        """Return the records as the core keeps them."""
+        """Return the records in the form of the core."""
         return _core.SimulatedLogs(
             self.robot.core,
             self.records,
@@ -284,11 +282,11 @@ class ClosedLoopFitter(ModelFitter):
         self.simulated = self.simulated.part(logs)
 
     def counted(self) -> Array:
-        """Return what every residual counts for (n_residuals,): the square of its certainty."""
+        """Return the weight of each residual (n_residuals,): its squared certainty."""
         return np.concatenate([row for log in self._counted_by_log() for row in log.T])
 
     def counted_by_axis(self) -> Array:
-        """Return the sum of the same by axis (n_axes,)."""
+        """Return the sum of these weights by axis (n_axes,)."""
         return np.asarray(np.sum([log.sum(axis=0) for log in self._counted_by_log()], axis=0))
 
     def _counted_by_log(self) -> list[Array]:
@@ -296,7 +294,7 @@ class ClosedLoopFitter(ModelFitter):
         return [c[: len(c) // step * step : step] ** 2 for _, _, c, _, _ in self.records]
 
     def along(self, records: list[Record], weighting: Weighting | None = None) -> Self:
-        """Return the same for other runs, as ``records`` are, and with other weights where given."""
+        """Return the same fitter for other ``records``, with another ``weighting`` if given."""
         other = copy(self)
         other.records = records
         other.weighting = self.weighting if weighting is None else weighting
@@ -304,7 +302,7 @@ class ClosedLoopFitter(ModelFitter):
         return other
 
     def beginnings(self) -> ModelFitter | None:
-        """Return the same for the first halves of the logs, if they are long enough."""
+        """Return the same fitter for the first halves of the logs; None if one is shorter than 4 s."""
         halves = [len(c) // 2 for _, _, c, _, _ in self.records]
         if min(halves) < _LEAST_S / self.robot.sample_time_s:
             return None

@@ -1,4 +1,4 @@
-"""Inverse-dynamics mode: torque predicted from the measured motion, no reference needed."""
+"""Inverse-dynamics comparison: torque predicted from the measured motion, without references."""
 
 from __future__ import annotations
 
@@ -42,19 +42,23 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 
 
-# Of the table of the low-pass, linear in between: it follows the gain to a few ten-thousandths.
+# Points in the table of the low-pass gain; linear interpolation is exact to a few 1e-4.
 _FREQUENCIES = 200
-# Mean square distance of a uniform band from one of its ends is four times that from its middle.
+# Factor on the standard deviation of a band if the simulator lies at one end of it: a uniform band has four
+# times the mean square distance from its end than from its middle.
 _FROM_ONE_END = 2.0
-# Natural step of effects, as a share of their typical size.
+# Step of the derivatives of effects, as a share of their natural size.
 _STEP = 1e-3
 
 
 class InverseView(View):
-    """Torque predicted from the measured motion."""
+    """Compares the measured torque with that predicted from the measured motion."""
 
     feels_steps: ClassVar[bool] = False
-    """What a loop makes of them moves the machine, and is in the torque as in the motion; the rest is smoothed."""
+    """False: what the loop makes of encoder steps is in torque and motion alike.
+
+    The low-pass removes the rest.
+    """
 
     def __init__(
         self, robot: Robot, logs: list[Log], settings: Settings, held_out: Sequence[Log] = ()
@@ -69,7 +73,7 @@ class InverseView(View):
             logs,
             lambda m: predicted_torque(robot, AS_GIVEN, m),
             cutoff,
-            # All logs are treated alike, those held out too.
+            # All logs use the same signals, validation logs too.
             measured=has_velocity([*logs, *held_out]),
             highest_hz=rigid_below_hz(robot),
         )
@@ -92,19 +96,19 @@ class InverseView(View):
         self.unfelt = other_controllers_of_targets(robot, logs)
 
     def _certain(self, logs: Sequence[Log], motions: Sequence[Motion], floor: Floor) -> list[Array]:
-        """Return how far every sample of the estimation logs can be predicted, zero where it does not count."""
+        """Return the certainty of each sample of the estimation logs (n, n_axes); zero if it does not count."""
         found = certainties(
             motions,
             self._dry_friction_nm,
             floor.weighting,
             lambda x: self.filtering.spread(x, self._sample_time_s),
         )
-        # What counts in part has a part of what padding makes: the fit leaves it out.
+        # Next to an end in motion, the low-pass mixes in padding: the fit leaves these samples out.
         whole = [np.floor(self.filtering.counted(log))[:, None] for log in logs]
         return [certain * counts for certain, counts in zip(found, whole, strict=True)]
 
     def _as_rigid(self, robot: Robot, log: Log) -> Motion:
-        """Return the motion of a log, and its torque as rigid gears would have it."""
+        """Return the motion of a log, and its torque without the deflection of the gears."""
         position, velocity, acceleration, torque = at = self.filtering(log)
         bent = deflection_torque(robot, at, log.sample_time_s)
         return position, velocity, acceleration, np.ascontiguousarray(torque - bent)
@@ -112,19 +116,19 @@ class InverseView(View):
     def candidates(
         self, model: FittedModel, *, axes: Collection[int] | None = None
     ) -> list[Hypothesis]:
-        """Return the candidates of `View`, each in its turn."""
+        """Return the candidates of `View` whose turn it is beside the causes of ``model``."""
         return [f for f in super().candidates(model, axes=axes) if _in_its_turn(f.effect, model)]
 
     def measured(self, log: Log) -> Array:
-        """Return the low-passed torque."""
+        """Return the low-passed torque (n, n_axes) [Nm]."""
         return self._low_passed(log.torque_nm)
 
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
-        """Return the predicted torque of every log, low-passed as the measured one."""
+        """Return the predicted torque of each log (n, n_axes) [Nm], low-passed like the measured one."""
         return [self._low_passed(self._predicted(variant, log)) for log in logs]
 
     def counted(self, log: Log) -> Array:
-        """Return what the error of every sample counts for (n, 1), of mean square one: of ends in motion nothing."""
+        """Return the weight of each sample's error (n, 1), with mean square one; zero at ends in motion."""
         counts = self.filtering.counted(log)[:, None]
         return np.asarray(counts / np.sqrt(np.mean(counts**2)))
 
@@ -134,14 +138,14 @@ class InverseView(View):
         return predicted_torque(self.robot, variant, at) + bent
 
     def taken_off(self, log: Log, off_nm: Array) -> Array:
-        """Return what the torque of a log is off the predicted one (n, n_axes) [Nm], as others are low-passed later."""
+        """Return measured minus predicted torque of a log (n, n_axes) [Nm], before the low-pass."""
         del off_nm
         return log.torque_nm - self._predicted(AS_GIVEN, log)
 
     def apart(self, logs: Sequence[Log], others: Sequence[Log]) -> Array:
-        """Return how far the motions of others are off those of logs (n_axes,) [1].
+        """Return the relative difference between the motions of two sets of logs (n_axes,) [1].
 
-        The larger of two: rms of speeds, and of the torques predicted along both, over those of the logs.
+        The rms difference of the speeds, or of the predicted torques if larger, over the scatter of ``logs``.
         """
         speeds, theirs = ([self.filtering(x)[1] for x in each] for each in (logs, others))
         torques = [self.torques(AS_GIVEN, each) for each in (logs, others)]
@@ -153,7 +157,7 @@ class InverseView(View):
     def noises(
         self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
     ) -> list[Array]:
-        """Return the error that noise of position and torque causes, for every log."""
+        """Return the error (n, n_axes) [Nm] that noise of position and torque causes, for each log."""
         del variant
         return [
             self.counted(log) * self.noise.error(log, run)
@@ -161,16 +165,16 @@ class InverseView(View):
         ]
 
     def left_open(self, logs: Sequence[Log]) -> list[Array]:
-        """Return what dry friction leaves open where motors stand or turn round.
+        """Return the standard deviation (n, n_axes) [Nm] that dry friction leaves open near standstill.
 
-        A simulator may stand at one end of the band, and the machine anywhere in it.
+        The simulator may be at one end of the band, and the machine anywhere in it.
         """
         found = open_torque_nm([self.filtering(log) for log in logs], self._dry_friction_nm)
         return [_FROM_ONE_END * x for x in found]
 
     def remarks(self) -> tuple[str, ...]:
-        """Say how the logs were filtered, and what the floor is made of."""
-        chosen = "the cutoff that predicts held-out data best"
+        """Return sentences about the filters of the logs and the source of the floor."""
+        chosen = "chosen as what predicts data left out best"
         highest = rigid_below_hz(self.robot)
         if self.settings.cutoff_hz:
             chosen = "as given"
@@ -198,10 +202,11 @@ class InverseView(View):
 
 
 def _in_its_turn(effect: Effect, model: FittedModel) -> bool:
-    """Whether an effect is looked for beside the causes of a model by inverse dynamics.
+    """Whether an effect is tried beside the causes of a model by inverse dynamics.
 
-    What no formula has of a real machine passes for something late beside a cause, and, where friction
-    is missing at all, for one that changes with time: that is asked where plain friction is a cause.
+    On a real machine, errors of formulas look like a lag beside another cause, and like an effect that changes
+    with time if friction is missing. So a lag is tried only on an axis without causes. Effects that change with
+    time are tried only beside the causes that they presuppose, such as plain friction.
     """
     beside = {f.effect.name for f in model.free if f.effect.axis == effect.axis}
     if first := effect_info(effect.name).beside:
@@ -210,20 +215,20 @@ def _in_its_turn(effect: Effect, model: FittedModel) -> bool:
 
 
 def _relative(these: Sequence[Array], others: Sequence[Array]) -> Array:
-    """Return the rms (n_axes,) of what others are off signals over theirs about its mean [1]."""
+    """Return the rms difference of two sets of signals, over the scatter of the first (n_axes,) [1]."""
     signal, other = np.concatenate(these), np.concatenate(others)
     size = np.maximum(signal.std(axis=0), 1e-300)
     return np.asarray(np.sqrt(np.mean((other - signal) ** 2, axis=0)) / size)
 
 
-# Stretches of time that a gain is compared over need that many blocks, all logs together.
+# Smallest number of blocks in all logs together, which effects that change with time need.
 _BLOCKS = 20.0
-# A block is longer than what the low-pass and the friction around a reversal smear.
+# Shortest block, in periods of the cutoff: longer than the low-pass and the friction smear a reversal.
 _PERIODS = 10.0
 
 
 def block_s(logs: Sequence[Log], cutoff_hz: float, settings: Settings) -> float:
-    """Return how long blocks of data are [s]: those of the settings, shorter in short logs."""
+    """Return the length of blocks of data [s]: that of the settings, less for short logs."""
     total = sum(log.duration_s for log in logs)
     return min(settings.block_s, max(total / _BLOCKS, _PERIODS / cutoff_hz))
 
@@ -234,11 +239,12 @@ def certainties(
     weighting: Weighting,
     spread: Callable[[Array], Array],
 ) -> list[Array]:
-    """Return how far low-passed torques can be predicted in every sample: dry friction leaves some open.
+    """Return the certainty of each sample of low-passed torques (n, n_axes), lower where dry friction leaves them open.
 
-    A stretch at standstill counts as one residual. ``spread``: what the low-pass makes of what is open.
+    All samples of one standstill count as one residual. ``spread``: the largest torque that the low-pass leaves
+    of an open torque.
     """
-    # Of white noise, as the weight at rest counts it.
+    # For white noise, with the weight at zero frequency.
     error_nm = 1 / (weighting.weight[:, 0] * np.sqrt(weighting.decimation))
     out = []
     for left_open, still in zip(
@@ -250,13 +256,13 @@ def certainties(
 
 
 def _without_effects(robot: Robot) -> Callable[[Motion], Array]:
-    """Return what a robot without its effects predicts."""
+    """Return the prediction of a robot without its effects, as a function of the motion."""
     bare = robot.with_effects([])
     return lambda at: predicted_torque(bare, AS_GIVEN, at)
 
 
 class InverseDynamicsFitter(ModelFitter):
-    """Error of the torque predicted from the measured motion."""
+    """Fits the error of the torque predicted from the measured motion."""
 
     adds_up = True
 
@@ -279,32 +285,36 @@ class InverseDynamicsFitter(ModelFitter):
         self.motions = self.motions.part(logs)
 
     def tempered(self, factor: Array) -> ModelFitter:
-        """Return the same with the errors of every axis times a factor (n_axes,)."""
+        """Return the same fitter with the errors of each axis multiplied by a factor (n_axes,)."""
         other = copy(self)
         other.certainty = [c * factor for c in self.certainty]
         other.motions = self.motions.with_certainty(other.certainty)
         return other
 
     def counted(self) -> Array:
-        """Return what every residual counts for (n_residuals,): the square of its certainty."""
+        """Return the weight of each residual (n_residuals,): its squared certainty."""
         step = self.weighting.decimation
         kept = (factor[: len(factor) // step * step : step] for factor in self.certainty)
         return np.concatenate([row for log in kept for row in log.T**2])
 
     def tolerated(self, effect: Effect) -> float:
-        """Return the same; of what is late a sample, for which a drive holds what it commands."""
+        """Return the size up to which an effect is ordinary scatter.
+
+        For a lag, that is one sample: a drive holds its command for that long.
+        """
         return self.robot.sample_time_s if is_lag(effect) else super().tolerated(effect)
 
     def takes_part(self, name: str) -> bool:
-        """Springs and their damping do not show in a rigid prediction."""
+        """Whether an own parameter matters: stiffness and damping of gears do not, since the prediction is rigid."""
         quantity = name.rsplit(".", 1)[1]
         return quantity not in ("stiffness", "damping")
 
     def _specs(self, parameters: Sequence[Parameter], effects: Sequence[Effect]) -> list[Spec]:
-        """Return the parameters for the core, effects in small steps.
+        """Return the parameters for the core, with small steps for effects.
 
-        What moves a block beyond all reason within its natural step has no derivative in the core: a
-        simulation is chaotic there. A predicted torque never is, and motors may be small.
+        The core gives no derivative for a parameter that changes a block too much within its natural step: a
+        simulation is chaotic there. A predicted torque is never chaotic, but a natural step may be too large
+        for a small motor.
         """
         steps = (p if p.effect is None else replace(p, scale=_STEP * p.scale) for p in parameters)
         return [core_spec(p, effects) for p in steps]
@@ -339,10 +349,10 @@ class InverseDynamicsFitter(ModelFitter):
 
 
 def inverse_floor(logs: Sequence[Log], noise: InverseNoise, settings: Settings) -> Floor:
-    """Return the floor of a predicted torque: its noise, and the errors of formulas."""
+    """Return the floor of a predicted torque, from its noise and the model error."""
     rate = 1.0 / logs[0].sample_time_s
     variance = np.mean([np.var(x.torque_nm, axis=0) for x in logs], axis=0)
-    # What is drawn scatters by a few percent from log to log, and what is estimated from it too.
+    # The variance of drawn noise scatters by a few per cent from log to log, and so does its estimate.
     noise_variance = np.mean([noise.error(x, i).var(axis=0) for i, x in enumerate(logs)], axis=0)
     total = np.maximum(noise_variance + settings.model_error**2 * variance, 1e-12 * variance)
     filtering = noise.filtering

@@ -1,7 +1,7 @@
-"""Positions of simulator and machine under the same targets, where no torque was logged.
+"""Comparison of positions under the same targets, for logs without torque.
 
-Errors of position are told as the torque that the controller's gains make of them: one number for the
-whole band, comparable with torques of causes.
+An error of position is shown as the torque that the controller's gains make of it. This one number covers the
+whole band, and compares with the torques of causes.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ from axisight.simulation import white_noise
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# Of the rate of the logs: what is compared lies below, where a spline between samples is a motion, and
-# noise, which gains of speed make the more of the faster it is, does not drown it.
+# Cutoff of the comparison, as a share of the logs' rate. Below it, a spline between samples follows the motion.
+# The speed gain amplifies fast noise, which would dominate above.
 _BAND = 0.2
-# How often what a motion does between samples is taken from the gains that were found.
+# Number of re-fits of uncertain gains, each with the motion between samples of the last one.
 _ROUNDS = 2
-# Samples of a segment of a density, at the rate of the logs.
+# Largest number of samples in a segment of a spectral density, at the logs' rate.
 _SEGMENT = 256
-# Of the slowest frequency that a log holds, half a wave of it: what is slower is constant.
+# Lowest frequency that is compared, in periods of the longest log; slower errors count as constant.
 _WHOLE_LOG = 0.5
 
 
 class TargetsView(View):
-    """Simulator and machine driven by the same targets, positions compared."""
+    """Compares the positions of simulator and machine, both driven by the same targets."""
 
     by_targets = True
     compared = "positions"
@@ -67,25 +67,27 @@ class TargetsView(View):
             robot, records, floor.weighting, _tolerances(robot, settings), settings.block_s
         )
         for _ in range(_ROUNDS if fitter.gains else 0):
-            # Gains say most of what a motion does between samples.
+            # The motion between samples depends mostly on the gains.
             self._like = Variant(must_hold(fitter.fit([])).robot_values)
             fitter = fitter.along(_records(logs, self._between_samples(logs, settings)))
         super().__init__("closed_loop", robot, logs, settings, fitter, floor)
 
     def _between_samples(self, logs: Sequence[Log], settings: Settings) -> list[Array]:
-        """Return what a motion does between the samples of logs (n, n_axes) [rad], by the simulator.
+        """Return the motion between the samples of logs (n, n_axes) [rad], from the simulator.
 
-        As given, but for uncertain gains, which are as they are found.
-
-        Targets are steps, and a joint answers each of them within a sample: a spline through positions
-        that were logged just before the next step knows nothing of it, and lags the motion.
+        The simulator is as given, with the fitted values of uncertain gains. Targets are steps, and a joint
+        responds to each within a sample. A spline through positions that are logged just before the next step
+        misses this, and lags the motion.
         """
         of, step = self._commanded, self._commanded.step
         positions = simulated_positions(of.robot, self._like, logs, threads=settings.threads)
         return [x - of.fine(x[::step]) for x in positions]
 
     def removed_there(self, found: SearchState, logs: Sequence[Log]) -> float | None:
-        """Return the share of what weighted residuals have above noise on ``logs`` that the causes remove."""
+        """Return the share of the weighted residuals above noise on ``logs`` that the causes remove.
+
+        None if a simulation diverges.
+        """
         there = self.fitter.along(_records(logs, self._between_samples(logs, self.settings)))
         before = there.loss([], found.baseline)
         left = there.loss(found.model.free, found.model)
@@ -95,10 +97,11 @@ class TargetsView(View):
         return (before - left) / above if above > 0 else 0.0
 
     def _floor(self, robot: Robot, logs: list[Log], settings: Settings) -> Floor:
-        """Return the floor: noise of the sensors as the gains take it, and errors of formulas.
+        """Return the floor: sensor noise through the controller's gains, and the model error.
 
-        Densities at the rate of the logs: below half of it those at the controller's are ``step`` times
-        as large. What is constant along a log is left out: where it begins is known no better.
+        Densities are at the logs' rate; below half of it, those at the controller's rate are ``step`` times as
+        large. Constant errors get no weight, since the start position is only as well known as the other
+        samples.
         """
         step = self._commanded.step
         rate = 1.0 / (robot.sample_time_s * step)
@@ -126,18 +129,18 @@ class TargetsView(View):
         return Floor(self._std_rad, f, noise, weighting, expected)
 
     def _gains(self, frequency_hz: Array) -> Array:
-        """Return how the controller answers an error of position, (n_axes, n_freq) [Nm/rad]."""
+        """Return the gain of the controller for an error of position (n_axes, n_freq) [Nm/rad]."""
         f = np.maximum(frequency_hz, frequency_hz[1])
         return told_gain(self._commanded.robot, f)
 
     def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
-        """Return the answer of the loop's position to an effect (n_freq,)."""
+        """Return the response of the loop's position to an effect (n_freq,)."""
         f = np.maximum(frequency_hz, frequency_hz[1])
         found = periodic_response(self.robot, effect, axis, loop_responses(self.robot, f), f)
         return np.asarray(found / controller_response(self.robot, f)[:, axis, axis])
 
     def measured(self, log: Log) -> Array:
-        """Return what the controller commands along the measured positions."""
+        """Return the controller's command along the measured positions (n, n_axes) [Nm]."""
         return log.torque_nm
 
     @property
@@ -152,7 +155,7 @@ class TargetsView(View):
 
     @property
     def lowpass_hz(self) -> float:
-        """Cutoff of the low-pass that errors of position pass [Hz]."""
+        """Cutoff [Hz] of the low-pass for errors of position."""
         return _BAND / self.logged_s
 
     def positions(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
@@ -160,35 +163,36 @@ class TargetsView(View):
         return simulated_positions(self.robot, variant, logs, threads=self.settings.threads)
 
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
-        """Return what it commands along the simulated positions."""
+        """Return measured commands plus the simulator's position error as torque (n, n_axes) [Nm], for each log."""
         return [
             log.torque_nm + self._as_torque(self.off_by(position, log))
             for position, log in zip(self.positions(variant, logs), logs, strict=True)
         ]
 
     def run(self, variant: Variant, log: Log) -> tuple[Array, Array]:
-        """Return the same of one log, and its simulated position."""
+        """Return the same torque on one log, and the simulated position [rad], (n, n_axes) each."""
         (position,) = simulated_positions(self.robot, variant, [log])
         return log.torque_nm + self._as_torque(self.off_by(position, log)), position
 
     def off_by(self, position_rad: Array, log: Log) -> Array:
-        """Return what is compared of an error of position, at the samples of a log (n, n_axes) [rad].
+        """Return the compared part of a position error, at the samples of a log (n, n_axes) [rad].
 
-        Without its mean: a log's first position is as noisy as the others, and a run begins there.
+        Low-passed and without its mean: a run starts at the log's first position, which is as noisy as the
+        others.
         """
         logged = (position_rad - log.position_rad)[:: self.step]
         return self.passed(logged - logged.mean(axis=0))
 
     def passed(self, logged: Array) -> Array:
-        """Return of a signal at the rate of the logs (n, n_axes) what is compared of it."""
+        """Return a signal at the logs' rate (n, n_axes), low-passed for the comparison."""
         return lowpass(np.ascontiguousarray(logged), self.logged_s, _BAND / self.logged_s)
 
     def _as_torque(self, passed_rad: Array) -> Array:
-        """Return an error at the rate of the logs (n, n_axes) [rad] as torque, at the controller's."""
+        """Return an error at the logs' rate (n, n_axes) [rad] as torque [Nm], at the controller's rate."""
         return self._commanded.told_as(self._commanded.fine(passed_rad))
 
     def position_noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
-        """Return what is compared of the noise of the sensors, at the samples of every log [rad]."""
+        """Return the compared part of the sensor noise at the samples of each log (n, n_axes) [rad]."""
         noise = [
             white_noise(self.settings.seed, run, len(log.time_s[:: self.step]), self.robot.n_axes)
             for run, log in enumerate(logs, start=first_run)
@@ -198,12 +202,12 @@ class TargetsView(View):
     def noises(
         self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
     ) -> list[Array]:
-        """Return what noise of the sensors is as torque, for every log."""
+        """Return the sensor noise as torque (n, n_axes) [Nm], for each log."""
         del variant
         return [self._as_torque(x) for x in self.position_noises(logs, first_run)]
 
     def remarks(self) -> tuple[str, ...]:
-        """Say what was compared."""
+        """Return sentences about what is compared."""
         said = what_is_compared(1.0 / self.logged_s)
         short = ", ".join(map(str, self._commanded.short_of_inertia))
         if not short:
@@ -216,23 +220,23 @@ class TargetsView(View):
 
 
 def what_is_compared(rate_hz: float) -> str:
-    """Return a sentence that says what is compared of logs of a rate [Hz]."""
+    """Return a sentence about what is compared for logs of a rate [Hz]."""
     return (
         f"No torque was logged: positions are compared under the same targets, up to {_BAND * rate_hz:.3g} Hz. "
         "Their errors are given as the torque that the stated gains command."
     )
 
 
-# Of a sample of the controller: how well it is known when a target takes effect. Simulators and drives
-# differ by half of their own steps, which are shorter.
+# Error of the time at which a target takes effect, as a share of the controller's sample. Simulators and drives
+# differ by half of their own steps, which are shorter than that sample.
 _WHEN = 0.125
 
 
 def _tolerances(robot: Robot, settings: Settings) -> dict[str, float]:
-    """Return the tolerances of the simulator's parameters where targets drive it.
+    """Return the tolerances of the simulator's parameters under targets.
 
-    A target that takes effect ``t`` later acts as friction ``kp t`` on the motor: viscous friction is known no
-    better than that.
+    A delay ``t`` of the targets acts as friction ``kp t`` on the motor. So viscous friction has at least that
+    tolerance.
     """
     out = dict(settings.tolerances_of(robot))
     values, late_s = robot.parameters(), _WHEN * robot.sample_time_s
@@ -254,9 +258,9 @@ def _stiffness(robot: Robot) -> Array:
 
 
 def _records(logs: Sequence[Log], between: Sequence[Array]) -> list[Record]:
-    """Return references, positions, how far each sample counts, and where each log begins.
+    """Return the record of each log: references, positions, certainty, start angles and length of the run-up.
 
-    ``between``: what the motion does between samples that were logged.
+    ``between`` (n, n_axes) [rad]: motion between the logged samples, added to the positions.
     """
     out = []
     for log, off in zip(logs, between, strict=True):
@@ -273,7 +277,7 @@ def _records(logs: Sequence[Log], between: Sequence[Array]) -> list[Record]:
 
 
 class TargetsFitter(ClosedLoopFitter):
-    """Position of a simulator that is driven by targets, less the measured one."""
+    """Fits the difference between positions of a simulator driven by targets and measured ones."""
 
     driven_by = "reference"
     compared = "position"
@@ -292,5 +296,5 @@ class TargetsFitter(ClosedLoopFitter):
         self.gains = frozenset(p.name for p in gains)
 
     def bends(self, name: str) -> bool:
-        """Whether a parameter changes what others do, by much more than masses and stiffness."""
+        """Whether a parameter changes the sensitivities of others by far more than masses and stiffness do: a gain."""
         return name in self.gains

@@ -1,4 +1,4 @@
-"""Weights of the error that keeps a simulator on logs: noise, errors of formulas, what answers noise."""
+"""Weights of the error that keeps a simulator on logs, from noise, model error and the torque's response to noise."""
 
 from __future__ import annotations
 
@@ -25,23 +25,24 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# Logs along which noise is simulated: with noise and without they fill the lanes of one simulation.
+# Number of logs along which noise is simulated. Runs with and without noise fill the lanes of one simulation.
 _SIMULATED = 2
-# Share of the torque that is taken as driven by the references at least: a weight stays above zero.
+# Smallest share of the torque that counts as driven by the references, so that each weight stays positive.
 _LEAST_DRIVEN = 1e-3
-# Times the answer to noise, as a linear loop without lags gives it, that counts as answer. A lag of a millisecond
-# amplifies it by a fifth, noise that is not white has more of it where motion is, and a tenth of it still bends what
-# is fitted: with two times in place of ten, delays came out a tenth too long, and one in two better as a current loop.
+# Factor on the response to noise of a linear loop without lags, up to which torque counts as such a response. A
+# lag of 1 ms raises the response by 20 %, and noise that is not white has more power where motion is. A tenth
+# of a response still biases a fit: with a factor of two instead of ten, delays come out 10 % too long, and
+# every second one fits better as a current loop.
 _AS_ANSWER = 10.0
 
 
 def tracking_floor(
     tracking: Robot, own: Robot, logs: list[Log], settings: Settings
 ) -> tuple[Floor, TrackingWeights]:
-    """Return the floor of the feedback that keeps a simulator on logs, and what its weights come from.
+    """Return the floor of the feedback that keeps a simulator on logs, and the source of its weights.
 
-    ``tracking`` has the controller that keeps it there, ``own`` the machine's. Noise is simulated
-    in the loop.
+    ``tracking``: the robot with that feedback as its controller; ``own``: with the machine's controller. The
+    noise is simulated in the tracking loop.
     """
     std = np.maximum(position_noise_std(logs), own.position_noise_std)
     like = shortest(logs)
@@ -57,17 +58,18 @@ def tracking_floor(
 
 
 def shortest(logs: Sequence[Log]) -> Log:
-    """Return the log whose segments all others have too."""
+    """Return the shortest log; all others have at least one segment of its length."""
     return min(logs, key=lambda log: log.n_samples)
 
 
 class TrackingWeights:
-    """Weights by the density of noise and of errors of formulas, and by what the torque tells.
+    """Weights from the densities of noise and model error, and from the share of the torque that is not noise.
 
-    ``std_rad`` (n_axes,) of the noise of the sensors, ``sampled`` (n_axes, n_freq) the density of what the
-    loop that keeps the simulator on a log makes of it in a simulation, ``noise`` the same smoothed. Errors
-    of formulas are a share ``model_error`` of the torque as the machine's own controller would
-    command it: they pass the loop as any torque on the motor does.
+    - ``std_rad`` (n_axes,): sensor noise.
+    - ``sampled`` (n_axes, n_freq): density of simulated torque noise in the tracking loop; ``noise``: the same,
+      smoothed.
+    - ``model_error``: error of formulas, as a share of the torque that the machine's own controller commands.
+      It passes the loop like any torque on the motor.
     """
 
     def __init__(
@@ -87,7 +89,7 @@ class TrackingWeights:
         self._answer = _answer(from_angle, std_rad)
 
     def of(self, torques: Sequence[Array], like: Log) -> Array:
-        """Return the weights (n_axes, n_freq) for logged torques, sampled as a log is."""
+        """Return the weights (n_axes, n_freq) for logged torques, with segments as for the log ``like``."""
         _, torque = _density(torques, like)
         total = self.noise + self.model_error**2 * torque * self._passed**2
         total /= self.driven(torque)
@@ -95,12 +97,12 @@ class TrackingWeights:
         return np.asarray(1.0 / np.sqrt(np.maximum(total, 1e-12 * torque.max())))
 
     def driven(self, torque: Array) -> Array:
-        """Return the share of a logged torque's density that does not answer noise (n_axes, n_freq).
+        """Return the share of a logged torque's density that is not a response to noise (n_axes, n_freq).
 
-        What the machine's controller makes of the noise moves the machine, and is in the logged torque as
-        in the logged position. A simulator kept on both would be fitted to make little of it, and not to
-        be right: the bias of direct identification in closed loop (Forssell and Ljung, 1999). Where
-        the torque is such an answer, it tells nothing of the machine.
+        The machine's controller turns sensor noise into torque, which moves the machine: both are in the log. A
+        simulator kept on torque and position would be fitted to respond little to it, instead of correctly.
+        This is the bias of direct identification in closed loop (Forssell and Ljung, 1999). Torque that
+        responds to noise therefore gets no weight.
         """
         share = 1.0 - _AS_ANSWER * self._answer / np.maximum(torque, 1e-300)
         share[:, :SLOW] = 1.0
@@ -108,19 +110,19 @@ class TrackingWeights:
 
 
 def _density(torques: Sequence[Array], like: Log) -> tuple[Array, Array]:
-    """Return frequencies and mean density of torques (n_axes, n_freq), by segments as those of a log."""
+    """Return frequencies and mean density of torques (n_axes, n_freq), with segments as for the log ``like``."""
     rate, segment = 1.0 / like.sample_time_s, segment_of(like)
     found = [torque_density(x, rate, segment) for x in torques]
     return found[0][0], np.asarray(np.mean([density for _, density in found], axis=0))
 
 
 def _answer(from_angle: Complex, std_rad: Array) -> Array:
-    """Return the density of torque that answers noise of the sensors (n_axes, n_freq), all linear."""
+    """Return the density of the torque's linear response to sensor noise (n_axes, n_freq)."""
     return np.asarray(np.einsum("fij,j->if", np.abs(from_angle) ** 2, std_rad**2))
 
 
 def passed(robot: Robot, frequency_hz: Array) -> Array:
-    """Return the share of a torque on the motor that the loop answers with (n_axes, n_freq)."""
+    """Return the share of a torque on the motor that shows in the loop's command (n_axes, n_freq)."""
     _, from_torque = loop_responses(robot, frequency_hz)
     return _of_axes(from_torque)
 

@@ -1,4 +1,4 @@
-"""What a way of comparing simulator and logs has to say; `axisight.gap.views.choice` chooses one."""
+"""The interface of a comparison between simulator and machine; `axisight.gap.views.choice` chooses one."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ Complex = NDArray[np.complex128]
 
 @dataclass
 class View(ABC):
-    """One way of comparing simulator and logs: what to fit, what error it leaves, what floor."""
+    """A comparison between simulator and machine: its fitter, its error and its floor."""
 
     by_targets: ClassVar[bool] = False
     """Whether positions are compared under the same targets, not torques."""
     compared: ClassVar[Compared] = "torques"
     feels_steps: ClassVar[bool] = True
-    """Whether steps of measured positions make the torque that is compared another one."""
+    """Whether steps of measured positions change the compared torque."""
 
     mode: Mode
     robot: Robot
@@ -50,21 +50,21 @@ class View(ABC):
     fitter: ModelFitter
     floor: Floor
     cutoff_hz: float | None = None
-    """Of the low-pass on both sides; None where there is none."""
+    """Cutoff of the low-pass on both sides [Hz]; None without one."""
     shown: tuple[AlgebraicCause, ...] = ()
-    """Causes that the logs show by themselves."""
+    """Causes that the logs show without a fit."""
     unfelt: tuple[AlgebraicCause, ...] = ()
-    """The same that the torques that are compared do not feel."""
+    """The same, for causes that do not change the compared torque."""
     not_offered: frozenset[str] = frozenset()
-    """Labels of effects that the logs settle by themselves: no candidates."""
+    """Labels of effects that the logs decide without a fit; they are no candidates."""
 
     @property
     def lowpass_hz(self) -> float | None:
-        """Cutoff of the low-pass that both sides of a comparison pass [Hz]; None where neither is filtered."""
+        """Cutoff of the low-pass on both sides of the comparison [Hz]; None without one."""
         return self.cutoff_hz
 
     def __post_init__(self) -> None:
-        """Tell the fitter what is large on this robot."""
+        """Give the fitter the natural sizes of effects and the unknown torque constants of this robot."""
         self.fitter.natural = NaturalSizes(self.robot, self.logs)
         self.fitter.own += unknown_constants(self.robot, unknown_axes(self.logs))
         self._turned: Sequence[Sequence[Turning]] = ()
@@ -74,12 +74,12 @@ class View(ABC):
     ) -> list[Hypothesis]:
         """Return the candidates, with start values from the residual of a model.
 
-        On ``axes`` (from 1), by default those where it leaves something worth a cause: of the logs that it
-        was fitted to, or in closed loop of each as the others predict it. By inverse dynamics what filters smear
-        around reversals is predicted badly, too.
+        They act on ``axes`` (from 1); by default on axes whose residual leaves room for a cause. That is the
+        residual of the fitted logs, or in closed loop also of each log predicted from the others. Inverse
+        dynamics does not use the latter: it predicts badly what filters smear around reversals.
         """
         enough = self.floor.expected + self.settings.smallest_gain
-        # A square is more than less than nothing, and less than infinity.
+        # Limits that all axes exceed (-1), or none (infinity).
         if axes is not None:
             enough = np.where(np.isin(self.robot.axis_numbers(), list(axes)), -1.0, np.inf)
         elif self.mode == "closed_loop":
@@ -112,54 +112,57 @@ class View(ABC):
         return np.asarray(weight * self.response(effect, axis, frequency_hz))
 
     def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
-        """Return how an effect that repeats with the motor angle shows in the error of its axis.
+        """Return the response of an axis' torque error (n_freq,) to an effect that is periodic in the motor angle.
 
-        From its torque or angle to the torque error, (n_freq,); ``axis`` from 0. By default the effect
-        is a torque that is missing as it is.
+        The input is the torque or angle of the effect; ``axis`` from 0. By default the effect is a missing
+        torque that shows unchanged.
         """
         del effect, axis
         return np.ones(len(frequency_hz), dtype=np.complex128)
 
     def remarks(self) -> tuple[str, ...]:
-        """Say what was done to the logs."""
+        """Return sentences about the treatment of the logs."""
         return ()
 
     @abstractmethod
     def measured(self, log: Log) -> Array:
-        """Return the torque errors are taken from (n, n_axes) [Nm]."""
+        """Return the torque from which errors are taken (n, n_axes) [Nm]."""
 
     @abstractmethod
     def torques(self, variant: Variant, logs: Sequence[Log]) -> list[Array]:
         """Return the torque of a simulator on each log (n, n_axes) [Nm]."""
 
     def counted(self, log: Log) -> Array:
-        """Return what the error of every sample of a log counts for (n, 1), of mean square one."""
+        """Return the weight of the error of each sample of a log (n, 1), with mean square one."""
         return np.ones((log.n_samples, 1))
 
     def errors(self, torques: Sequence[Array], logs: Sequence[Log]) -> list[Array]:
-        """Return the errors of predicted torques on logs, each (n, n_axes) [Nm], as far as they count."""
+        """Return the weighted errors of predicted torques on logs, (n, n_axes) [Nm] each."""
         return [
             self.counted(log) * (torque - self.measured(log))
             for torque, log in zip(torques, logs, strict=True)
         ]
 
     def taken_off(self, log: Log, off_nm: Array) -> Array:
-        """Return what the torque of a log is off the model's, as it is taken off others (n, n_axes) [Nm].
+        """Return measured minus predicted torque of a log (n, n_axes) [Nm], to be subtracted from other logs.
 
-        ``off_nm``: the same as it is compared.
+        ``off_nm``: the same difference as compared.
         """
         del log
         return off_nm
 
     def apart(self, logs: Sequence[Log], others: Sequence[Log]) -> Array:
-        """Return how far motions that torques are predicted from lie apart (n_axes,) [1], zero where none are."""
+        """Return the relative difference between the motions of two sets of logs (n_axes,) [1].
+
+        Zero if torques are not predicted from measured motions.
+        """
         del logs, others
         return np.zeros(self.robot.n_axes)
 
     def run(self, variant: Variant, log: Log) -> tuple[Array, Array | None]:
         """Return torque [Nm] and motor position [rad] of a simulator on one log, (n, n_axes) each.
 
-        The torque is that of `torques`; no position where the simulator takes the measured one.
+        The torque is as in `torques`. The position is None if the simulator uses the measured one.
         """
         return self.torques(variant, [log])[0], None
 
@@ -167,36 +170,36 @@ class View(ABC):
     def noises(
         self, logs: Sequence[Log], first_run: int, variant: Variant = AS_GIVEN
     ) -> list[Array]:
-        """Return the torque error of noise alone on each log (n, n_axes) [Nm].
+        """Return the torque error that noise alone causes on each log (n, n_axes) [Nm].
 
-        The noise of log ``i`` is that of run ``first_run + i``. ``variant``: the machine that it acts on,
-        where it goes round a loop.
+        Log ``i`` has the noise of run ``first_run + i``. ``variant``: the machine in whose loop the noise acts.
         """
 
     def left_open(self, logs: Sequence[Log]) -> list[Array] | None:
-        """Return what a torque may differ by from the predicted one without anything missing, on each log.
+        """Return the scatter of a torque that needs no cause, for each log; None if nothing is left open.
 
-        Standard deviation in every sample (n, n_axes) [Nm]. None where nothing is left open.
+        Standard deviation of each sample (n, n_axes) [Nm]: a torque may differ by it although no effect is
+        missing.
         """
         del logs
         return None
 
     def sensor_noises(self, logs: Sequence[Log], first_run: int) -> list[Array]:
-        """Return the same of the noise that the robot file states, whatever the logs have."""
+        """Return the torque error of the noise that the robot file states, for each log (n, n_axes) [Nm]."""
         return self.noises(logs, first_run)
 
     def removed_there(self, found: SearchState, logs: Sequence[Log]) -> float | None:
-        """Return the share of what weighted residuals have above noise on ``logs`` that the causes remove.
+        """Return the share of the weighted residuals above noise on ``logs`` that the causes remove.
 
-        None where it is not known: plain torques say little of what is small and slow.
+        None if it is unknown: plain torques show little of small and slow effects.
         """
         del found, logs
         return None
 
     def followed(self, found: SearchState, logs: Sequence[Log]) -> float:
-        """Return the share of the explainable error that causes remove on ``logs`` that they are kept on.
+        """Return the share of the explainable error that causes remove in a simulator kept on ``logs``.
 
-        1 where all of it is, 0 where nothing keeps a simulator on a log.
+        1 if they remove all of it, 0 for a comparison without such a simulator.
         """
         del found, logs
         return 0.0
