@@ -1,1 +1,1 @@
-"""What a user hands over, turned into logs that can be compared."""
+"""Turns the inputs of a user into logs that can be compared."""

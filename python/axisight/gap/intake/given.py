@@ -1,4 +1,4 @@
-"""What a caller of `axisight.diagnose` hands over, turned into a simulator and logs with roles."""
+"""Turns the arguments of `axisight.diagnose` into a simulator and logs with roles."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from axisight.robot import Robot, load_robot
 from axisight.robot.presets import PRESETS
 from axisight.robot.sources import MODEL_SUFFIXES
 
-# How files of robots end; tables (.csv) may be logs.
+# Suffixes of robot files; tables (.csv) may be logs.
 _ROBOTS = {*MODEL_SUFFIXES, ".toml"} - {".csv"}
 _HOW = "diagnose(robot, logs, validation=...)"
 _ONE_LOG = (
@@ -29,7 +29,10 @@ _ONE_LOG = (
 
 @dataclass(frozen=True)
 class Given:
-    """A simulator, or where it is read from, and logs with roles; `says` what was done without being asked."""
+    """A simulator or its source, and logs with roles.
+
+    ``says``: sentences about choices that the caller did not make.
+    """
 
     name: str
     source: Robot | Path | str
@@ -48,11 +51,11 @@ def given_inputs(
     simulated: object,
     columns: AnyMap | Path | str | None,
 ) -> Given:
-    """Return what was handed over; arguments as those of `diagnose`, of which ``first`` is ``case``.
+    """Return simulator and logs from the arguments of `diagnose`, of which ``first`` is ``case``.
 
-    Without validation logs the last of several ``logs`` is held out. Raises InputError naming the argument
-    that is missing, of another type, or given twice; CaseError without logs of either role; LogError for
-    logs that cannot be read.
+    Without validation logs, the last of several ``logs`` is held out. Raises InputError naming an argument that
+    is missing, of another type, or given twice; CaseError if a role has no log; LogError for a log that cannot
+    be read.
     """
     case, source, logs = _sorted_out(first, logs, robot, estimation)
     if case is not None:
@@ -81,7 +84,7 @@ def given_inputs(
 
 
 def check_options(settings: object) -> None:
-    """Raise InputError for settings of another type."""
+    """Raise InputError if the settings have another type."""
     if settings is not None and not isinstance(settings, Settings):
         raise InputError(f"settings: expected Settings, got {shown(settings)}")
 
@@ -89,7 +92,7 @@ def check_options(settings: object) -> None:
 def _sorted_out(
     first: object, logs: object, robot: object, estimation: object
 ) -> tuple[Case | None, Robot | Path | str | None, object]:
-    """Return the case, or the simulator and the logs to fit and choose on; None for what is not there."""
+    """Return the case, the simulator and the logs to split; None for each that was not given."""
     chosen = None if robot is None else _robot("robot", robot)
     some = _some(estimation)
     if logs is not None and some:
@@ -123,7 +126,7 @@ def _sorted_out(
 
 
 def _case_path(path: Path) -> Path:
-    """Return the path of a case; raises InputError for a robot without logs and a log without robot."""
+    """Return the path of a case; raise InputError for a robot without logs, or a log without a robot."""
     if str(path) in PRESETS or path.suffix.lower() in _ROBOTS:
         _no_logs(path)
     if path.is_file() or is_folder_log(path):
@@ -146,7 +149,7 @@ def _is_path(value: object) -> bool:
 
 
 def _some(value: object) -> bool:
-    """Whether logs were given: none is an empty list, or nothing."""
+    """Whether logs were given; None and an empty list are none."""
     return value is not None and not (isinstance(value, tuple | list) and not value)
 
 
@@ -163,7 +166,7 @@ def _robot(field: str, value: object) -> Robot | Path | str:
 
 
 def _with_both(given: Given) -> Given:
-    """Return what was given; raises CaseError without logs of either role."""
+    """Return the inputs; raise CaseError if a role has no log."""
     if not given.estimation or not given.validation:
         raise CaseError(
             f"{given.name}: expected at least one estimation and one validation log, "
@@ -173,7 +176,7 @@ def _with_both(given: Given) -> Given:
 
 
 class _Reader:
-    """Reads logs of a robot, whatever they come as; the robot is loaded when the first one needs it."""
+    """Reads logs of a robot from any accepted form; the robot is loaded when the first log needs it."""
 
     def __init__(self, source: Robot | Path | str, columns: AnyMap | Path | str | None) -> None:
         self._source = source
@@ -181,7 +184,7 @@ class _Reader:
         self._loaded: Robot | None = source if isinstance(source, Robot) else None
 
     def logs(self, field: str, given: object) -> list[Log]:
-        """Return logs, given as one or as several; raises InputError naming the field and the place."""
+        """Return logs, given as one or as several; raise InputError naming the field and the place."""
         if given is None:
             return []
         if isinstance(given, Log) or _is_path(given) or is_table(given):

@@ -1,4 +1,4 @@
-"""What a user hands over on the command line, turned into a robot and logs with roles."""
+"""Turns the arguments of the command line into a robot and logs with roles."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from axisight.logs.untrusted import check_log_inside
 from axisight.robot import Robot, load_robot
 from axisight.robot_import import is_model_file
 
-# How models end that may stand first among logs; tables (.csv) are logs there.
+# Suffixes of models that may stand first among the logs; tables (.csv) count as logs.
 _MODELS = (".urdf", ".xml", ".mjcf", ".toml")
 _NONE_HELD = "--validation: expected a log to hold out, or at least two logs"
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """A simulator with its file or preset, the logs to fit and choose on, and those for the figures.
+    """A simulator with its file or preset, estimation logs and validation logs.
 
-    ``simulated``: logs of the user's own simulator, beside these in this order.
+    ``simulated``: logs of the user's own simulator, in the order of estimation and validation logs.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Inputs:
     simulated: tuple[Log, ...] = ()
 
     def files(self) -> list[Path]:
-        """Return the files that simulator and logs were read from."""
+        """Return the files of simulator and logs."""
         logs = (*self.estimation, *self.validation, *self.simulated)
         parts = [part for log in logs for part in files_of(log.source)]
         return [Path(self.robot_source), *parts]
@@ -54,13 +54,17 @@ def read_inputs(
     untrusted: bool = False,
     max_bytes: int | None = None,
 ) -> Inputs:
-    """Read a case folder, or logs with a model, which ``load`` turns into a robot, ``bare`` into one to read by.
+    """Read a case folder, or logs with a model.
 
-    The model may be the first of the ``paths``. Without ``validation`` the last of several logs is held out.
-    ``used``: what is used of each log; of one log, its last run is held out; ``simulated``: logs of
-    the user's own simulator; ``untrusted`` as in `read_case`, and for logs as in `check_log_inside`;
-    ``max_bytes`` as in `read_log`. Raises InputError when nothing is left to hold out, the model is
-    missing, or of a log nothing can be used.
+    ``load`` makes a robot of the model; ``bare`` makes a robot that is only used to read logs. Without
+    ``model`` the first path may be the model.
+
+    - ``validation``: by default the last of several logs is held out; of one log that is cut into runs, its
+      last run.
+    - ``used``: the used part of each log; ``simulated``: logs of the user's own simulator.
+    - ``untrusted``: as in `read_case`, and for logs as in `check_log_inside`; ``max_bytes``: as in `read_log`.
+
+    Raises InputError if no log is left to hold out, the model is missing, or nothing of a log can be used.
     """
     paths = [usable_path(path, InputError) for path in paths]
     for path in (*paths, *validation, *simulated) if untrusted else ():
@@ -78,7 +82,7 @@ def read_inputs(
 
 
 def _used(read: Inputs, used: Used) -> Inputs:
-    """Return the inputs with what is used of each log; logs of a simulator are cut as those beside them."""
+    """Return the inputs with the used part of each log; a simulator's log is cut at the times of its measured log."""
     logs = (*read.estimation, *read.validation)
     sims = list(read.simulated)
     if len(sims) == len(logs):
@@ -101,11 +105,12 @@ def read_beside(
     max_bytes: int | None = None,
     currents: bool = False,
 ) -> tuple[Robot, list[Log]]:
-    """Return the robot of a file or preset, which ``load`` makes of it, and logs of it, read by ``bare``'s.
+    """Return the robot of a file or preset, and logs of it.
 
-    ``columns``, ``max_bytes`` and ``currents`` as in `read_log`. Raises LogError for a log that is none of this robot.
+    ``load`` makes the robot. Logs beside a model file are read with the robot from ``bare``. ``columns``,
+    ``max_bytes`` and ``currents`` as in `read_log`. Raises LogError for a log of another robot.
     """
-    # What a model file is to be loaded with, the sample time, stands in logs that are read by its axes.
+    # A model file needs a sample time, which stands in the logs, and these need the axes of the model.
     robot = bare(model) if is_model_file(model) else load(model)
     logs = [
         read_log(p, columns, robot=robot, max_bytes=max_bytes, currents=currents) for p in paths
@@ -114,7 +119,7 @@ def read_beside(
 
 
 def _loaded(load: Callable[..., Robot], source: Path | str, logs: Sequence[Log]) -> Robot:
-    """Return a robot; one of a model file has the sample time of its logs, unless its drive data say one."""
+    """Return a robot; a model file without drive data gets the sample time of its logs."""
     if not is_model_file(source):
         return load(source)
     return load(source, sample_time_s=logs[0].sample_time_s)
@@ -162,5 +167,5 @@ def _read(
         if len(logs) < 2 and not runs:
             raise InputError(_NONE_HELD)
         held = [logs.pop()] if len(logs) > 1 else []
-    # By the robot, not by its first log.
+    # The case is named after the robot, not after its first log.
     return Inputs(robot.name or Path(model).stem, robot, model, tuple(logs), tuple(held))

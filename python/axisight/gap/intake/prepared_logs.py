@@ -1,4 +1,4 @@
-"""A simulator and logs behind the gate, as they are compared."""
+"""Simulator and logs that passed the gate, ready for the comparison."""
 
 from __future__ import annotations
 
@@ -29,13 +29,14 @@ from axisight.robot import Robot
 
 @dataclass(frozen=True)
 class PreparedLogs:
-    """A simulator and logs that passed the gate, as they are compared.
+    """A simulator and logs that passed the gate, ready for the comparison.
 
-    ``commanded``: logs without torque with what the controller commands along them, where they have none;
-    ``nominal``: the torque constants by which currents were read whose constant nobody knows;
-    ``recovered``: whether the references are those that the controller must have had; ``simulator``: how
-    far the robot reproduces the user's own simulator, where its logs were given; ``beside``: these logs, from
-    where the others are taken.
+    - ``noted``: findings that were flagged.
+    - ``commanded``: the logs with the controller's commands, if they have no torque.
+    - ``recovered``: whether the references were reconstructed.
+    - ``nominal``: the constants with which currents of unknown torque constants were read.
+    - ``simulator``: how well the robot reproduces the user's own simulator, once that has been compared.
+    - ``beside``: logs of the user's own simulator, cut like the measured ones.
     """
 
     robot: Robot
@@ -49,11 +50,14 @@ class PreparedLogs:
     beside: tuple[Log, ...] = ()
 
     def view(self, settings: Settings) -> View:
-        """Return how simulator and logs are compared."""
+        """Return the comparison of simulator and logs."""
         return view_of(self.robot, self.estimation, self.validation, settings, self.commanded)
 
     def compared(self, settings: Settings) -> tuple[PreparedLogs, View]:
-        """Return how simulator and logs are compared: against the user's own simulator, where it has logs."""
+        """Return the prepared logs and their comparison.
+
+        If logs of the user's own simulator are given, the gap is that of this simulator.
+        """
         view = self.view(settings)
         if not self.beside:
             return self, view
@@ -61,7 +65,11 @@ class PreparedLogs:
         return inputs, inputs.view(settings)
 
     def against(self, view: View, simulated: Sequence[Log], settings: Settings) -> PreparedLogs:
-        """Return the same against the user's own simulator, by its logs."""
+        """Return the same with the gap of the user's own simulator, from its logs.
+
+        Where the robot reproduces that simulator well enough, the difference of the two is subtracted from the
+        logs.
+        """
         logs, n = [*self.estimation, *self.validation], len(self.estimation)
         commanded = self.commanded
         if commanded is None:
@@ -74,7 +82,7 @@ class PreparedLogs:
         if found.taken_off:
             logs = off.taken_from(logs)
         if commanded is not None:
-            # What the controller commands follows from the positions that are left.
+            # The controller's commands depend on the changed positions.
             commanded = commanded.along(logs)
             logs = list(commanded.logs)
         return replace(
@@ -87,16 +95,16 @@ class PreparedLogs:
         )
 
     def with_effects_of(self, robot: Robot, why: Sequence[Finding]) -> PreparedLogs:
-        """Return the same with a simulator that states its effects otherwise."""
+        """Return the same with a simulator that states its effects differently, and the findings about that."""
         commanded = None if self.commanded is None else replace(self.commanded, robot=robot)
         return replace(self, robot=robot, commanded=commanded, noted=(*self.noted, *why))
 
     def constants(self, refit: Mapping[str, Interval]) -> list[Finding]:
-        """Return what the re-fit makes of torque constants that nobody knows."""
+        """Return the findings about unknown torque constants after the re-fit."""
         return [n.finding(refit[constant_name(self.robot, n.axis)]) for n in self.nominal]
 
     def says(self, mode: str, compared: Compared) -> tuple[str, ...]:
-        """Return what is to be known of the logs."""
+        """Return sentences about how the logs were prepared."""
         own_poses = any(log.start_rad is not None and log.run_up is None for log in self.estimation)
         said = [
             "" if self.simulator is None else user_simulator.said(self.simulator, compared),
@@ -113,9 +121,9 @@ def behind_gate(
     despite: Collection[str],
     simulated: Sequence[Log] = (),
 ) -> PreparedLogs:
-    """Return simulator and logs behind the gate, with commands and references where none were logged.
+    """Return simulator and logs that passed the gate, with commands and references added if none were logged.
 
-    ``despite`` as in `Settings`, ``simulated`` and what is raised as in `diagnose`.
+    ``despite`` as in `Settings`, ``simulated`` and errors as in `diagnose`.
     """
     robot, slowed = with_bristles_followed(robot)
     read = in_torques(robot, estimation, validation)

@@ -1,4 +1,4 @@
-"""One log beside a simulator: what a diagnosis would compare, and what it would say before it fits anything."""
+"""Previews one log with a simulator: what a diagnosis would compare, and its findings before any fit."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from axisight.robot import Robot
 
 @dataclass(frozen=True)
 class Beside:
-    """What would be compared, in a sentence, empty where nothing would be; and every fault that shows."""
+    """The comparison as a sentence, empty if a finding refuses the log, and all findings."""
 
     compared: str
     findings: tuple[Finding, ...]
 
 
 def look_beside(robot: Robot, log: Log) -> Beside:
-    """Return what a diagnosis would do with a log of a robot.
+    """Return what a diagnosis would compare and find in a log of a robot, without a fit.
 
-    Raises InputError as `with_commands`, where a log without torque cannot be compared with this robot.
+    Raises InputError as `with_commands`, for a log without torque that cannot be compared with this robot.
     """
     read = in_torques(robot, [log], [])
     (log,) = read.estimation

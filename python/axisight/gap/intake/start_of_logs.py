@@ -1,6 +1,6 @@
-"""Logs of a closed loop that begin in motion: cut, run up to, or compared without their references.
+"""Handles closed-loop logs that start in motion: cuts them, adds a run-up, or drops their references.
 
-A simulation of the loop begins at rest. The state of the controller before a log is in no log.
+A simulation of the loop starts at rest, and no log contains the sums that a controller had before it.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from axisight.gap.views.closed_loop import TRACKING_SPEED
 from axisight.logs import Log
 from axisight.robot import Robot
 
-# Share of a log that has to be left.
+# Smallest share of a log that must be left.
 _LEFT = 0.5
 
 
 @dataclass(frozen=True)
 class Begun:
-    """Logs for a diagnosis, and what is to be said of those that begin in motion."""
+    """Logs for a diagnosis, and the findings about logs that start in motion."""
 
     estimation: list[Log]
     validation: list[Log]
@@ -45,17 +45,14 @@ def from_rest(
     simulated: Sequence[Log],
     despite: Collection[str] = (),
 ) -> Begun:
-    """Return logs along which the loop can be simulated.
+    """Return logs along which the loop can be simulated, each from a possible start.
 
-    | log | used |
-    |---|---|
-    | begins at rest | as it is |
-    | begins in motion, stands later | from where all axes first stand |
-    | never stands | from where a simulation that is run up to it has forgotten its start; the rest is run-up |
-    | no such run-up exists | all logs without their references, by inverse dynamics |
+    A log that starts in motion is cut where it first stands. A log that never stands gets a run-up, and is cut
+    where the simulation has forgotten its start. If one log allows no run-up, all logs lose their references.
+    Logs stay unchanged if the loop is not simulated along them.
 
-    ``simulated``: logs of the user's own simulator, one for each log or none; they are cut alike. ``despite`` as
-    in `Settings`. Unchanged where the loop is not simulated along the logs.
+    ``simulated``: logs of the user's own simulator, one for each log or none; they are cut alike. ``despite``
+    as in `Settings`.
     """
     logs = [*estimation, *validation]
     given = Begun(list(estimation), list(validation), list(simulated))
@@ -70,7 +67,7 @@ def from_rest(
         return given
     starts = [first_rest_s(log) if m else 0.0 for log, m in zip(logs, moving, strict=True)]
     if targets and any(s is None for s in starts):
-        # The commands along them are not known yet: they are run up to where these are made, or refused.
+        # Their commands are not computed yet; with_commands adds run-ups later, or refuses the logs.
         return given
     parts: list[Log] = []
     for log, start_s in zip(logs, starts, strict=True):
@@ -86,11 +83,10 @@ def from_rest(
 
 
 def _moving(run_ups: _RunUps, logs: list[Log], *, simulates: bool) -> list[bool]:
-    """Return which logs begin in motion.
+    """Return whether each log starts in motion; if its positions leave that open, simulations of its torque decide.
 
-    Where the positions of a log leave it open, the logged torque decides, beside that of a simulation from rest
-    and of one that is run up. If any log begins in motion, so do all that leave it open: they were logged alike.
-    Open logs to which no simulation can be run up count as at rest.
+    If one log starts in motion, the open ones do too, since all were logged in one way. An open log counts as
+    at rest if no run-up to it is possible.
     """
     robot = run_ups.robot
     noise = np.maximum(position_noise_std(logs), robot.position_noise_std)
@@ -108,14 +104,14 @@ def _moving(run_ups: _RunUps, logs: list[Log], *, simulates: bool) -> list[bool]
 
 
 class _RunUps:
-    """Logs of one simulator with a run-up, each made once."""
+    """Run-ups to the logs of one simulator, each computed once."""
 
     def __init__(self, robot: Robot, despite: Collection[str]) -> None:
         self.robot, self.despite = robot, despite
         self._made: dict[Log, Log | NotRunUpError] = {}
 
     def to(self, log: Log) -> Log | NotRunUpError:
-        """Return a log with a run-up, or why it can have none."""
+        """Return a log with a run-up, or the error that rules it out."""
         if log not in self._made:
             try:
                 self._made[log] = self._run_up(log)
@@ -126,7 +122,8 @@ class _RunUps:
     def _run_up(self, log: Log) -> Log:
         """Return a log with a run-up.
 
-        Raises NotRunUpError, also for a log with a fault: a simulation would go through what is cut off.
+        Raises NotRunUpError, also for a log with a fault, since the simulation runs through the part that is
+        cut off.
         """
         for fault in flagged(check_log_alone(log), self.despite):
             if fault.severity == "refuse":
@@ -135,9 +132,9 @@ class _RunUps:
         return run_up_to(self.robot, (self.robot, kept), log)
 
     def better_than_rest(self, log: Log) -> bool:
-        """Whether a simulation that is run up to a log does better than one from rest.
+        """Whether a simulation with a run-up fits a log better than one from rest.
 
-        Not along a log that no simulation goes along: what is wrong with it is the gate's to say.
+        False if no simulation along the log is possible; the gate reports its fault.
         """
         try:
             if torque_is_from_rest(self.robot, log):
@@ -148,14 +145,17 @@ class _RunUps:
         return isinstance(run_up, Log) and run_up_is_better(self.robot, log, run_up)
 
     def from_start(self, log: Log, start_s: float | None) -> Log | NotRunUpError:
-        """Return a log from where it stands, at ``start_s``, or with a run-up where it never does."""
+        """Return a log cut at ``start_s`` [s], where it first stands.
+
+        If it never stands (None), it gets a run-up, or the error is returned.
+        """
         if start_s is not None:
             return log.part(start_s) if start_s else log
         return self.to(log)
 
 
 def _taken(given: Begun, parts: Sequence[Log]) -> Begun:
-    """Return the parts in the place of their logs, and what is to be said of them."""
+    """Return the cut logs instead of the given ones, and the findings about them."""
     logs = [*given.estimation, *given.validation]
     sims = given.simulated
     if len(sims) == len(logs):
@@ -171,12 +171,12 @@ def _taken(given: Begun, parts: Sequence[Log]) -> Begun:
 
 
 def _first_s(log: Log, part: Log) -> float:
-    """Return where [s] in a log its last part begins."""
+    """Return the time [s] in a log where its last part starts."""
     return (log.n_samples - part.n_samples) * log.sample_time_s
 
 
 def first_rest_s(log: Log) -> float | None:
-    """Return where [s] all motors of a log first stand, and their references; None if too little is left."""
+    """Return the time [s] where all motors and references of a log first stand; None if too little is left after it."""
     n = max(4, round(REST_S / log.sample_time_s))
     still = stands(log)
     still[: n // 2] = False

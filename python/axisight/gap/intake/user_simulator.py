@@ -1,4 +1,4 @@
-"""The user's own simulator: how far the model reproduces it, and its gap instead of the model's."""
+"""Compares the model with the user's own simulator, and makes the gap that of this simulator."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from axisight.logs import Log
 
 Array = NDArray[np.float64]
 
-# Share of the gap of the user's simulator below which its difference from the model does not matter: a tenth
-# of the squared gap.
+# Difference of model and simulator that does not matter, as a share of the simulator's gap: 10 % of the squared
+# gap.
 _HARMLESS = 0.1**0.5
-# Of references and sample times that are the same but for rounding.
+# Largest relative difference between equal references or sample times, for rounding.
 _SAME = 1e-3
 
 
 def differs(found: Reproduction) -> NDArray[np.int64]:
-    """Return the axes (from 0) where the difference matters, and is more than noise."""
+    """Return the axes (from 0) where the difference matters and exceeds noise."""
     places = [w.axis - 1 for w in found.where]
     large = found.of_gap > _HARMLESS
     return np.flatnonzero(large & np.isin(np.arange(len(large)), places))
 
 
 def said(found: Reproduction, compared: Compared = "torques") -> str:
-    """Return a sentence about how far the model reproduces the user's simulator."""
+    """Return a sentence about how well the model reproduces the user's simulator."""
     axes = ", ".join(f"axis {i + 1}: {100 * x:.2g} %" for i, x in enumerate(found.per_axis))
     whose = (
         "The gap is that of your simulator: the difference is subtracted from the logs"
@@ -48,7 +48,7 @@ def said(found: Reproduction, compared: Compared = "torques") -> str:
 
 
 def noted(found: Reproduction) -> list[Finding]:
-    """Return a finding for every axis where the difference matters."""
+    """Return a finding for each axis where the difference matters."""
     return [_finding(found, int(axis)) for axis in differs(found)]
 
 
@@ -67,10 +67,10 @@ def _finding(found: Reproduction, axis: int) -> Finding:
 
 
 def paired(logs: Sequence[Log], simulated: Sequence[Log]) -> list[Log]:
-    """Return the logs of the user's simulator, each with the references of its measured log.
+    """Return the logs of the user's simulator, with references, start and run-up of the measured logs.
 
-    Raises InputError where they are not runs of the same motions: another number of logs or axes,
-    another rate or length, other references.
+    Raises InputError if they are not runs of the same motions: if number of logs or axes, rate, length or
+    references differ.
     """
     if len(simulated) != len(logs):
         raise InputError(
@@ -110,10 +110,11 @@ def _paired(log: Log, own: Log) -> Log:
 
 @dataclass(frozen=True)
 class Difference:
-    """Difference between the user's simulator and the model along each log: (n, n_axes) each.
+    """User's simulator minus model along each log; arrays are (n, n_axes).
 
-    ``torques_nm`` as they are compared, ``taken_nm`` as they are subtracted from logs; ``positions_rad`` of the
-    motors; ``theirs_nm``: torques of the user's simulator.
+    - ``theirs_nm``: torques of the user's simulator.
+    - ``torques_nm``: torque difference as compared; ``taken_nm``: as subtracted from logs.
+    - ``positions_rad``: difference of the motor positions.
     """
 
     theirs_nm: tuple[Array, ...]
@@ -122,9 +123,10 @@ class Difference:
     positions_rad: tuple[Array, ...]
 
     def taken_from(self, logs: Sequence[Log]) -> list[Log]:
-        """Return logs less the difference: the gap of the model along them is that of the user's simulator.
+        """Return logs minus the difference, so that the model's gap becomes that of the user's simulator.
 
-        In closed loop to first order of the difference, by inverse dynamics as far as both move alike.
+        Exact to first order of the difference, since the machine's loop responds to it too. By inverse
+        dynamics, exact if simulator and machine move alike.
         """
         each = zip(logs, self.taken_nm, self.positions_rad, strict=True)
         return [_less(log, u, x) for log, u, x in each]
@@ -143,7 +145,7 @@ def _less(log: Log, torque_nm: Array, position_rad: Array) -> Log:
 def difference(view: View, simulated: Sequence[Log], settings: Settings) -> Difference:
     """Return the difference between ``simulated`` logs and the model of ``view``.
 
-    By inverse dynamics the model follows the motion of each log, so positions do not differ.
+    By inverse dynamics the model follows the motion of each log, and the positions do not differ.
     """
     theirs = tuple(view.measured(own) for own in simulated)
     ours = view.torques(AS_GIVEN, simulated)
@@ -162,11 +164,11 @@ def difference(view: View, simulated: Sequence[Log], settings: Settings) -> Diff
 def reproduction(
     view: View, logs: Sequence[Log], simulated: Sequence[Log], off: Difference, settings: Settings
 ) -> Reproduction:
-    """Return how far the model of ``view`` reproduces the user's simulator, from their difference ``off``.
+    """Return how well the model of ``view`` reproduces the user's simulator; ``off``: the difference of the two.
 
     In closed loop the difference can be subtracted from the logs. By inverse dynamics it is known along the
-    motions of ``simulated`` only, so these have to be close to the measured ones. Dry friction changes sign
-    with the speed: its error is the root of the share by which the motions lie apart.
+    motions of ``simulated``, so these must be close to the measured motions. Dry friction, which turns round
+    with the speed, is off by the root of the relative distance of the motions.
     """
     real = [view.measured(log) for log in logs]
     counts = [view.counted(log) for log in logs]
