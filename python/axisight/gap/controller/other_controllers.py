@@ -28,9 +28,9 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Upper end of the compared band [Hz], and as a share of the Nyquist frequency; the lower one counts. Drives
-# filter the torques that they report above.
+# Upper end of the compared band [Hz]. Drives filter the torques that they report above.
 _BAND_HZ = 100.0
+# Upper end of that band for slow logs, as a share of the Nyquist frequency; the lower of the two counts.
 _SHARE_OF_NYQUIST = 0.2
 # Smallest error of the stated law, as a share of the torque's variance, that can show another controller.
 _NOTHING = 1e-4
@@ -39,16 +39,18 @@ _LEFT = 0.02
 # Start of a log that is left out, in periods of the band's upper end: its low-pass depends on what was before
 # the log.
 _BEGUN = 5
-# Range of the lags of a filter that are searched [s], and number of grid points before the refinement.
+# Range of the lags of a filter that are searched [s].
 _LAGS_S = (1e-4, 0.05)
+# Number of grid points of that search before its refinement.
 _STEPS = 12
 # Damping ratios of the filters that are tried: first order (0), Butterworth, and two first-order filters in a
 # row. The simulator's filter has the first order: slow motion shows the lag only.
 _FILTERS = (0.0, float(np.sqrt(0.5)), 1.0)
-# A gain counts as the stated one up to this relative difference. Intervals have at least the second half-width;
-# lags the third, relative, because filters with one lag are implemented in several ways.
+# Relative difference up to which a gain counts as the stated one.
 _SAME = 0.008
+# Smallest half-width of the interval of a gain, relative: filters with one lag are implemented in several ways.
 _FORMULA = 0.004
+# Half-width of the interval of a lag, relative, for the same reason.
 _OF_A_LAG = 0.1
 
 

@@ -24,14 +24,16 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Equal samples in a row that make a flat top, and samples in all flat tops together.
+# Number of equal samples in a row that make a flat top.
 _IN_A_ROW = 3
+# Smallest number of samples in all flat tops of an axis.
 _IN_ALL = 20
 # Relative width of one level. All flat tops of an axis must share one limit.
 _SAME_LEVEL = 1e-3
-# Share of the flat-top samples where the command must exceed the limit, and share of the torque's variance
-# elsewhere that the command must explain. If it explains less, the machine has another controller.
+# Share of the flat-top samples where the command must exceed the limit.
 _BEYOND = 0.95
+# Share of the torque's variance elsewhere that the command must explain. If it explains less, the machine has
+# another controller.
 _LAW_HOLDS = 0.99
 
 

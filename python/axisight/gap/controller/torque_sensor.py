@@ -15,8 +15,9 @@ from axisight.gap.facts.algebraic_cause import AlgebraicCause
 from axisight.gap.facts.named_cause import NamedCause
 from axisight.gap.facts.settings import Settings
 
-# Largest difference of the two gain errors [1], and of the torque constant from their inverse [1].
+# Largest difference of the two gain errors [1].
 _SAME_GAINS = 0.008
+# Largest difference of the torque constant from the inverse of the gain errors [1].
 _INVERSE = 0.02
 # Tolerances of the motor inertia by which a torque constant may be off without being seen as a cause. Usually
 # three are absorbed by the inertia; with few logs, five.

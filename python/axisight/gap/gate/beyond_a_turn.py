@@ -12,9 +12,9 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Smallest number of axes beyond a turn, and smallest share of the rotary axes. A single axis of an arm may turn
-# without limits.
+# Smallest number of axes beyond a turn for a finding. A single axis of an arm may turn without limits.
 _AXES = 2
+# Smallest share of the rotary axes beyond a turn for a finding.
 _SHARE = 0.5
 
 

@@ -14,9 +14,10 @@ Hashes = NDArray[np.uint64]
 
 # Bits of the finalizer of MurmurHash3 (Appleby, public domain).
 _SHIFT = np.uint64(33)
-# Shares of common rows from which logs are flagged, and from which they count as copies. Rows of different runs
-# are equal only with coarse sensors at rest, never with noise.
+# Share of common rows from which a log is flagged. Rows of different runs are equal only with coarse sensors at
+# rest, never with noise.
 _SHARED_ROWS = 0.05
+# Share of common rows from which a log counts as a copy.
 _COPY = 0.5
 
 

@@ -9,9 +9,10 @@ from axisight.logs import Log
 from axisight.logs.grid import RATE_TOLERANCE
 from axisight.robot import Robot
 
-# Joint angle per motor angle that is flagged, for a gear that speeds up, and that is refused. A ratio of 5
-# exists in principle; larger ones are catalogue ratios (50:1 to 300:1), the inverse.
+# Joint angle per motor angle above which a ratio is flagged: the gear speeds up.
 _SUSPICIOUS_RATIO = 1.0 + 1e-9
+# Joint angle per motor angle above which a ratio is refused. Five exists in principle; larger ones are
+# catalogue ratios (50:1 to 300:1), the inverse.
 _IMPOSSIBLE_RATIO = 5.0
 _DIFFERS = "sample_time_differs"
 

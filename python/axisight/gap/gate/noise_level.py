@@ -12,9 +12,9 @@ from axisight.logs import Log
 from axisight.logs.quality import quantization
 from axisight.robot import Robot
 
-# Ratio of measured to stated noise that is flagged; sensors of one type differ by less. And noise of a step,
-# relative to the step: steps matter from where this noise reaches the stated one.
+# Ratio of measured to stated noise that is flagged; sensors of one type differ by less.
 _LOUD = 5.0
+# Noise of a step, relative to the step. Steps matter from where this noise reaches the stated one.
 _STEP_NOISE = 1.0 / np.sqrt(12.0)
 # Fewest bits over the range of a position that are not flagged, without a stated noise.
 _FEW_BITS = 12.0

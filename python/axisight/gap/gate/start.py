@@ -12,10 +12,10 @@ from axisight.logs import Log
 from axisight.robot import Robot
 from axisight.simulation import simulate
 
-# Smallest simulated mean torque, as a share of the rms, that is caused by gravity. And range of the ratio of
-# measured to simulated mean that shows gravity with the wrong sign: within a factor of two, for a payload or
-# its absence.
+# Smallest mean of a simulated torque, as a share of its rms, that counts as caused by gravity.
 _GRAVITY_SHARE = 0.5
+# Range of measured over simulated mean that shows gravity with the wrong sign: within a factor of two, for a
+# payload or its absence.
 _TURNED_ROUND = (-2.0, -0.5)
 
 

@@ -33,9 +33,9 @@ _SURE = 3.0
 # Smallest share of a current that the controller's law must explain, and largest relative difference between
 # the factors of its two parts. Otherwise the machine has another controller.
 _EXPLAINED, _SAME = 0.9, 0.1
-# Largest relative difference between the sample times of a log and of the controller; and start of the upper
-# part of the band, as a share of the Nyquist frequency.
+# Largest relative difference between the sample times of a log and of the controller.
 _SAME_CLOCK = 1e-3
+# Start of the upper part of the band, as a share of the Nyquist frequency.
 _UPPER = 0.8
 
 

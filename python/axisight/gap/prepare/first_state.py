@@ -19,17 +19,19 @@ from axisight.simulation import simulate_batch
 
 Array = NDArray[np.float64]
 
-# Distance between the knots of the B-splines [s], one sample at least, and the number of changes of an axis'
-# references. A change is the difference of two neighbouring cubic B-splines that end at the start of the log.
-# Together they excite modes up to half the knots' rate. Each sums to zero.
+# Distance between the knots of the B-splines [s], at least one sample. A change of the references is the
+# difference of two neighbouring cubic B-splines that end at the start of the log, and sums to zero. The changes
+# excite modes up to half the knots' rate.
 _KNOT_S = 0.02
+# Number of changes of an axis' references.
 _SHAPES = 10
 LEAST_SAMPLES = _SHAPES + 4
 """Smallest number of samples of a run-up that holds all changes."""
-# Size of each change in its trial simulation, as a share of the references' rms. Smallest singular value that
-# is used, as a share of the largest. And number of steps.
+# Size of each change in its trial simulation, as a share of the references' rms.
 _TRIED = 0.05
+# Smallest singular value that is used, as a share of the largest.
 _TOLD = 0.01
+# Largest number of Gauss-Newton steps.
 _STEPS = 2
 
 

@@ -17,20 +17,22 @@ from axisight.simulation import simulate
 Array = NDArray[np.float64]
 Begins = Literal["rest", "motion", "open"]
 
-# Samples of the shortest parabola through the first positions, and duration of the longest [s]: loops respond
-# to a step of their reference within milliseconds.
+# Samples of the shortest parabola through the first positions.
 _FEWEST = 4
+# Duration of the longest parabola [s]: loops respond to a step of their reference within milliseconds.
 _LONGEST_S = 0.01
-# Standard deviations of noise that a term of a parabola must exceed, and that positions may be off a parabola.
+# Standard deviations of noise that a term of a parabola must exceed.
 _NOISES = 6.0
+# Standard deviations of noise that positions may be off a parabola.
 _OFF = 3.0
 # Smallest acceleration that counts, as a share of the largest in the log.
 _STEADY = 0.03
-# Start of a log where two simulations are compared, as a share of the part that a run-up would cut off: a wrong
-# start fades. Share of the total squared difference of the two after which the comparison ends. And share of
-# the difference that the log must show to start in motion.
+# Start of a log where two simulations are compared, as a share of the part that a run-up would cut off: the
+# effect of a wrong start fades.
 _COMPARED = 0.5
+# Share of the total squared difference of the two simulations after which the comparison ends.
 _FADED = 0.8
+# Share of that difference that a log must show to start in motion.
 _HALF = 0.5
 # Smallest noise of a torque, as a share of the arm's largest torque scatter.
 _NOISELESS = 1e-3

@@ -27,9 +27,9 @@ Array = NDArray[np.float64]
 
 # Largest relative difference between a log's sample time and a whole multiple of the controller's.
 _CLOCK = 0.01
-# Largest speed of a start at rest: a share of the top speed, plus so many standard deviations of the speed's
-# noise.
+# Largest speed of a start at rest, as a share of the top speed.
 _AT_REST = 0.02
+# Standard deviations of the speed's noise that are added to it.
 _NOISES = 6.0
 
 

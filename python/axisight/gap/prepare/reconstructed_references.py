@@ -21,9 +21,9 @@ from axisight.simulation import simulate, white_noise
 Array = NDArray[np.float64]
 
 # Largest noise of a reconstructed reference in the upper part of the band, relative to the noise of measured
-# speeds; a reference should have none. More is left if the machine has another controller. And start of the
-# upper part, as a share of the Nyquist frequency.
+# speeds; a reference should have none. More is left if the machine has another controller.
 _NOISE_LEFT = 0.1
+# Start of the upper part of the band, as a share of the Nyquist frequency.
 _UPPER = 0.8
 # Largest speed step at the start that counts as rest, as a share of the largest speed. It comes from a holding
 # torque that differs a little from the simulator's.

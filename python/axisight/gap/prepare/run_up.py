@@ -26,10 +26,11 @@ from axisight.simulation import simulate
 
 Array = NDArray[np.float64]
 
-# Duration of the run-up [s], with at least `LEAST_SAMPLES`; and duration [s] and fewest samples from which the
-# first motion of a log is estimated.
+# Duration of the run-up [s], with at least `LEAST_SAMPLES`.
 RUN_UP_S = 0.5
+# Duration from which the first motion of a log is estimated [s].
 _SEEN_S = 0.02
+# Fewest samples from which the first motion is estimated, at the controller's rate.
 _SEEN_SAMPLES = 8
 # Fewest logged samples from which the first motion is estimated, for logs sampled slower than the controller.
 _SEEN_STEPS = 4

@@ -16,13 +16,15 @@ from axisight.logs import Log
 Array = NDArray[np.float64]
 Span = tuple[float, float | None]
 
-# Window of a mean speed [s]; speed below which a motor stands, as a share of the largest; and standard
-# deviations of the mean speed's noise that are added to it.
+# Window of a mean speed [s].
 REST_S = 0.2
+# Mean speed below which a motor stands, as a share of the largest.
 STANDS = 0.005
+# Standard deviations of the mean speed's noise that are added to it.
 _NOISES = 6.0
-# Rest that is kept before and after a motion [s], and rest that separates two motions [s].
+# Rest that is kept before and after a motion [s].
 _KEPT_S = 0.2
+# Rest that separates two motions [s].
 _BETWEEN_S = 0.5
 # Shortest part of a log [s].
 _SHORTEST_S = 1.0

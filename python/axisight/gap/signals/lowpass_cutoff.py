@@ -14,8 +14,9 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Range of cutoffs [Hz] that are tried: below the first resonance of most machines, above most of their motion.
+# Highest cutoff that is tried [Hz]: below the first resonance of most machines.
 _HIGHEST_HZ = 60.0
+# Lowest cutoff that is tried [Hz]. Slower modes of a robot are pendulum motions.
 _LOWEST_HZ = 2.0
 # Smallest number of samples in a period of the cutoff.
 _OVERSAMPLING = 5.0

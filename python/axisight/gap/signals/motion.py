@@ -28,8 +28,9 @@ _RINGS = 3.0
 # Order of the low-pass's gain. It is twice the filter's order, since the filter runs forward and backward.
 _ORDER = 2 * LOWPASS_ORDER
 # Length of an end in motion that is left out, in periods of the cutoff: the torque beyond the end counts for 1
-# % after it. And the largest length, as a share of the log.
+# % after it.
 _FORGETS = 1.5
+# Largest length of such an end, as a share of the log.
 _AT_MOST = 0.2
 # Length of the ramp after a left-out end, as a share of that end.
 _FADES = 1 / 3

@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 
 # Largest number of samples in a segment of a spectral density (Welch 1967).
 _SEGMENT = 2048
-# Logs of at most so many samples have too few frequencies in the top fifth of the spectrum; they use the top
-# two.
+# Number of samples up to which a log has too few frequencies in the top fifth of its spectrum; it uses the top
+# two fifths.
 _SHORT = 4000
 
 

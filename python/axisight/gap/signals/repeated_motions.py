@@ -12,10 +12,11 @@ from axisight.logs import Log
 
 Array = NDArray[np.float64]
 
-# Largest rms difference of the positions of repeats, and of their speeds, as a share of the range of an axis.
-# Controllers repeat a motion to 0.1 %. Different multisines on one square wave have similar positions; only
-# their speeds, which have more noise, tell them apart.
+# Largest rms difference of the positions of repeats, as a share of an axis' range. Controllers repeat a motion
+# to 0.1 %.
 _SAME = 0.01
+# Largest rms difference of their speeds, as a share of the range. Multisines on one square wave have similar
+# positions; only their speeds, which have more noise, tell them apart.
 _SAME_SPEED = 0.02
 
 

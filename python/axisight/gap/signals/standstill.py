@@ -35,9 +35,9 @@ def dry_friction_nm(motions: Sequence[Motion], predict: Callable[[Motion], Array
     return out
 
 
-# Smallest share of the samples in each direction, which separates friction from an offset. And the smallest top
-# speed of a log for an estimate, as a share of the top speed in all logs.
+# Smallest share of the samples in each direction that separates friction from an offset.
 _EACH_WAY = 0.01
+# Smallest top speed of a log for an estimate of friction, as a share of the top speed in all logs.
 _MOVES = 0.1
 
 

@@ -7,13 +7,16 @@ import math
 # Largest relative difference from a unit's factor: ratios of filtered signals are that exact, and no other unit
 # is as near.
 _TOLERANCE = 0.04
+# Degrees per radian.
 _DEG = 180.0 / math.pi
 
+# Factors of positions in other units than rad [1].
 _POSITION = {
     "position_in_degrees": _DEG,
     "position_in_revolutions": 0.5 / math.pi,
     "position_in_mrad": 1000.0,
 }
+# Factors of speed references in other units than rad/s [1].
 _VELOCITY_REF = {
     "velocity_ref_in_deg_s": _DEG,
     "velocity_ref_in_rpm": 30.0 / math.pi,
@@ -22,8 +25,9 @@ _VELOCITY_REF = {
 }
 # Factors of torques in other units than Nm [1].
 _TORQUE = {"torque_in_mnm": 1000.0, "torque_in_knm": 0.001}
-# Range of the bits per motor turn in encoder catalogues.
+# Fewest bits per motor turn in encoder catalogues.
 _LEAST_COUNT_BITS = 8
+# Most bits per motor turn in encoder catalogues.
 _MOST_COUNT_BITS = 30
 
 

@@ -20,8 +20,9 @@ from axisight.robot import Robot
 
 UNKNOWN = 1.0
 """Relative tolerance of an unknown torque constant [1]: one standard deviation is a factor of two."""
-# Effects of the core that hold own parameters of the simulator, and the parameters of these effects.
+# Effect of the core that holds an unknown torque constant.
 _CONSTANT = TORQUE_CONSTANT[0]
+# Parameters of the effect that holds gains.
 _FIRST, _SECOND = OTHER_GAINS[1]
 # Parameter of the effect *other gains* for each gain, of the controllers whose gains may have a tolerance.
 _OF_GAINS: Mapping[str, Mapping[str, str]] = {

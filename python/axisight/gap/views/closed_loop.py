@@ -162,9 +162,9 @@ def _contiguous(x: Array) -> Array:
     return np.ascontiguousarray(x, dtype=np.float64)
 
 
-# Cutoffs [Hz] for speeds, where sensor noise is no motion, and for the torque of rigid bodies, below which most
-# arms are rigid.
+# Cutoff for speeds [Hz], below which sensor noise does not count as motion.
 _SPEED_HZ = 20.0
+# Cutoff for the torque of rigid bodies [Hz], below which most arms are rigid.
 _RIGID_HZ = 5.0
 
 
@@ -213,10 +213,10 @@ def records_of(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> li
     return out
 
 
-# Longest start of a log that does not count, as a share of the log. And end that does not count if positions
-# come in steps [s], for the same reason as `_MIRRORED_S`: the error of a position there is at least half a
-# step.
+# Longest start or end of a log that does not count, as a share of the log.
 _MOST_FORGOTTEN = 0.25
+# End of a log that does not count if positions come in steps [s], for the same reason as `_MIRRORED_S`: the
+# error of a position there is at least half a step.
 _END_S = 0.5
 
 

@@ -13,14 +13,17 @@ from axisight.gap.signals.unit_scales import scale_name
 from axisight.logs import Log
 from axisight.robot import Robot
 
-# Share of the torque's variance that the law must explain to hold, and below which an axis is flagged. On
-# simulated machines with any effect, the law leaves 0.1 %, limits included. A named mistake must leave as
-# little, with factors near one. Other gains, filters and feedforward leave more.
+# Share of the torque's variance that the law must explain to hold. On simulated machines with any effect it
+# leaves 0.1 %, limits included. A named mistake must leave as little. Other gains, filters and feedforward
+# leave more.
 HOLDS = 0.99
+# Share of the variance below which an axis is flagged if no mistake is found.
 _EXPLAINED = 0.9
-# Ranges of the factors of reference and position: near one, of the stated gains, and of other gains.
+# Range of the factors of reference and position with which a law holds.
 _ONE = (0.9, 1.1)
+# Range of these factors that counts as the stated gains.
 _SAME_GAINS = (0.8, 1.25)
+# Range of a common factor that counts as other gains and is only flagged.
 _OTHER_GAINS = (0.2, 5.0)
 # Delay up to which a channel is only flagged [s]: a controller may read its sensor that late, which is an
 # effect.

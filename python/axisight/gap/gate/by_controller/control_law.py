@@ -25,10 +25,11 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Upper end of the compared band [Hz], and as a share of the Nyquist frequency; the lower one counts. Drives
-# filter the torques that they report above. And samples compared in a period of the upper end.
+# Upper end of the compared band [Hz]. Drives filter the torques that they report above.
 _BAND_HZ = 60.0
+# Upper end of that band for slow logs, as a share of the Nyquist frequency; the lower of the two counts.
 _SHARE_OF_NYQUIST = 0.2
+# Samples that are compared in a period of the band's upper end.
 _SAMPLES_PER_BAND = 6
 # Time around a limit that is left out, in periods of the band's upper end: the low-pass smears the limit that
 # far.

@@ -23,12 +23,12 @@ Array = NDArray[np.float64]
 # Upper end of the compared band [Hz]: loops of arms follow up to some ten hertz.
 _BAND_HZ = 20.0
 # Correlation from which a position follows a reference. An axis at its torque limit for most of a log has 0.94.
-# And range of the ratio of reference to speed that is no finding.
 _FOLLOWS = 0.9
+# Range of the ratio of reference to speed that is no finding.
 _SIZE = (0.5, 2.0)
-# Mean square of speed minus reference, relative to the speed's, below which they are alike, and above which
-# not.
+# Mean square of speed minus reference, relative to the speed's, below which the two are alike.
 _ALIKE = 0.15
+# The same ratio above which the two are not alike.
 _UNLIKE = 0.5
 
 

@@ -12,14 +12,16 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Correlation from which a position follows a target, and largest delay of it [s], since loops may be soft. And
-# range of the ratio of position to target that is no finding.
+# Correlation from which a position follows a target.
 _FOLLOWS = 0.9
+# Largest delay of a position after its target [s]: loops may be soft.
 _LATE_S = 0.3
+# Range of the ratio of position to target that is no finding.
 _SIZE = (0.5, 2.0)
-# Mean square of position minus target, without means and relative to the position's, below which they are
-# alike, and above which not.
+# Mean square of position minus target, without means and relative to the position's, below which the two are
+# alike.
 _ALIKE = 0.15
+# The same ratio above which the two are not alike.
 _UNLIKE = 0.5
 
 

@@ -20,25 +20,28 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Cutoff [Hz] of the low-pass before the checks: motions of arms lie below. And samples kept in a period of the
-# cutoff.
+# Cutoff [Hz] of the low-pass before the checks: motions of arms lie below.
 _BAND_HZ = 10.0
+# Samples that are kept in a period of the cutoff.
 _SAMPLES_PER_BAND = 10
 # Unexplained share of an axis' torque variance from which mistakes are looked for. With friction and offset in
 # the regression, simulators of real machines leave 10 % or less.
 _SUSPICIOUS = 0.3
-# Conditions for naming a mistake. Undoing it must remove half of the unexplained share, summed over the axes,
-# and at least 8 % of one axis' variance. And it must leave less than 30 % on the axes concerned.
+# Share of the unexplained variance, summed over the axes, that a named mistake must remove when it is undone.
 _REMOVED = 0.5
+# Smallest such decrease of the sum, as a share of one axis' variance.
 _LEAST_REMOVED = 0.08
+# Largest unexplained share on the axes concerned once a named mistake is undone.
 _EXPLAINED = 0.3
 # Share of the torque's variance that the prediction must explain beyond friction for its factor to be known.
 _CARRIES = 0.1
-# Ranges of the factor of the torque that are no finding, no refusal on all axes, and no refusal of a unit on
-# one axis. A load or gravity that is compensated in the arm changes torques by up to two. A heavy tool changes
-# them by five and more on a wrist, not on all axes, and never by thirty.
+# Range of the factor of the torque that is no finding. A load or gravity that is compensated in the arm changes
+# torques by up to two.
 _SAME = (0.4, 2.5)
+# Range of the factor that is no refusal if all axes lie outside `_SAME`. A heavy tool changes the torque of a
+# wrist by five and more, but not that of all axes.
 _ALL_AXES = (0.25, 4.0)
+# Range of the factor that is no refusal of a unit on one axis: no load changes torques by thirty.
 _ONE_AXIS = (1 / 30.0, 30.0)
 _FASTEST_RAD_S = 3000.0
 """Motor speed [rad/s], 28 600 rpm, above which a position is in encoder counts."""

@@ -21,25 +21,28 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Steps of the differences for the first-order effects [s, rad joint side], as large as the errors looked for.
+# Step of the differences in time [s], as large as the errors looked for.
 _STEP_S = 0.02
+# Step of the differences in angle [rad, joint side], as large as the errors looked for.
 _STEP_RAD = 0.05
-# Smallest errors that are a finding [s, rad joint side], above the skew of real recorders (a few ms) and the
-# play of zero marks.
+# Smallest delay that is a finding [s], above the skew of real recorders (a few ms).
 _LEAST_S = 8e-3
+# Smallest offset that is a finding [rad, joint side], above the play of zero marks.
 _LEAST_RAD = 0.03
-# Largest errors [s, rad joint side]; larger ones are not of first order, and have another cause.
+# Largest delay [s]; a larger one is not of first order, and has another cause.
 _MOST_S = 0.2
+# Largest offset [rad, joint side]; a larger one is not of first order, and has another cause.
 _MOST_RAD = 0.6
-# Smallest share of the remaining error that one error must explain, and smallest significance [standard
-# errors], from the scatter between ten parts of each log. Payloads and other laws of friction explain less, or
-# not evenly.
+# Smallest share of the remaining error that one error must explain. Payloads and other laws of friction explain
+# less, or not evenly.
 _REMOVED = 0.05
+# Smallest significance of an error [standard errors].
 _SIGNIFICANT = 6.0
+# Number of parts of each log whose scatter gives the standard error.
 _PARTS = 10
-# Logs with less than a tenth of the largest effect are not compared; the ratio of the others' estimates to that
-# of all logs must lie in this range.
+# Logs whose effect has less than this share of the largest energy are not compared.
 _TELLS = 0.1
+# Range of the ratio of a log's estimate to that of all logs.
 _ALIKE = (0.5, 2.0)
 
 

@@ -18,11 +18,12 @@ from axisight.gap.signals.motion import Motion
 from axisight.logs import Log
 from axisight.robot import Robot
 
-# Conditions for a log to show a turned axis. Turned, it leaves less than 30 % of any axis' variance, less than
-# a quarter of the unexplained share before, summed over the axes, and at least 2 % less. An effect that the
-# simulator lacks does not vanish with a turned axis.
+# Largest unexplained share of an axis' variance that a log may have with a turned axis.
 _EXPLAINED = 0.3
+# Largest unexplained share with the turned axis, relative to that without, summed over the axes. An effect that
+# the simulator lacks does not vanish with a turned axis.
 _LEFT = 0.25
+# Smallest decrease of that sum.
 _LEAST_REMOVED = 0.02
 # Largest increase of the summed unexplained share in any log; logs that hardly couple the axes show nothing.
 _NO_WORSE = 0.005
