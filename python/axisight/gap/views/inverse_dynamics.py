@@ -174,7 +174,7 @@ class InverseView(View):
 
     def remarks(self) -> tuple[str, ...]:
         """Return sentences about the filters of the logs and the source of the floor."""
-        chosen = "chosen as what predicts data left out best"
+        chosen = "the cutoff that predicts held-out data best"
         highest = rigid_below_hz(self.robot)
         if self.settings.cutoff_hz:
             chosen = "as given"
