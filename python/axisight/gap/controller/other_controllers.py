@@ -72,7 +72,7 @@ class _Piece:
         self._kept = free_of_limits(torque, period)
         # No log contains the speed that the controller used at the first sample.
         self._kept[: _BEGUN * period] = False
-        self.torque = self._seen(torque)
+        self.torque = self._in_band(torque)
 
     @property
     def gains(self) -> tuple[str, str]:
@@ -88,17 +88,17 @@ class _Piece:
         speed = _filtered(self._speed, lag_s, damping, self._time)
         error, angle = self._reference - speed, self._angle
         if late:
-            error = self._reference - _later(speed, late)
-            angle = angle + self._position - _later(self._position, late)
+            error = self._reference - _delayed(speed, late)
+            angle = angle + self._position - _delayed(self._position, late)
         both = gain_shares(self._robot, error, angle, self._axis)
-        return np.column_stack([self._seen(x) for x in both])
+        return np.column_stack([self._in_band(x) for x in both])
 
     def forward(self) -> Array:
         """Return the rate of the speed reference and that reference (n, 2) [rad/s^2, rad/s]."""
         rate = np.diff(self._moved, prepend=self._moved[:1]) / self._time
-        return np.column_stack([self._seen(rate), self._seen(self._moved)])
+        return np.column_stack([self._in_band(rate), self._in_band(self._moved)])
 
-    def _seen(self, x: Array) -> Array:
+    def _in_band(self, x: Array) -> Array:
         """Return a torque, low-passed to the band, without samples near a limit and without its mean."""
         low = lowpass(np.ascontiguousarray(x), self._time, self._band_hz)[self._kept]
         return np.asarray(low - low.mean()) if len(low) else low
@@ -116,7 +116,7 @@ def _filtered(speed: Array, lag_s: float, damping: float, time_s: float) -> Arra
     )
 
 
-def _later(x: Array, samples: int) -> Array:
+def _delayed(x: Array, samples: int) -> Array:
     return np.concatenate([np.full(samples, x[0]), x[:-samples]])
 
 
@@ -161,7 +161,7 @@ def other_controllers(robot: Robot, logs: Sequence[Log]) -> tuple[AlgebraicCause
     clock = _clock(robot, logs, pieces, stated, off)
     if clock is not None:
         return (clock,)
-    return tuple(cause for i in off for cause in _of_axis(i, stated[i], pieces[i]))
+    return tuple(cause for i in off for cause in _causes_of_axis(i, stated[i], pieces[i]))
 
 
 def clock_drift(robot: Robot, logs: Sequence[Log]) -> float:
@@ -196,7 +196,7 @@ def _power(pieces: Sequence[_Piece]) -> Array:
     return np.array([float(p.torque @ p.torque) for p in pieces])
 
 
-def _of_axis(axis: int, stated: _Law, pieces: Sequence[_Piece]) -> list[AlgebraicCause]:
+def _causes_of_axis(axis: int, stated: _Law, pieces: Sequence[_Piece]) -> list[AlgebraicCause]:
     for law in _others(pieces):
         if _holds(law, stated, pieces):
             return _causes(axis, law, stated, pieces)

@@ -40,27 +40,27 @@ def as_speed_loop(robot: Robot, logs: Sequence[Log]) -> Robot:
     that they may be reconstructed. The robot stays unchanged if its gains are uncertain. It also stays
     unchanged if the logs show other gains: a cause names these as the robot file does.
     """
-    if robot.controller_kind != "pd_position" or not _is_one(robot):
+    if robot.controller_kind != "pd_position" or not _may_be_speed_loop(robot):
         return robot
     if not all(log.has_torque for log in logs):
         return robot
     if all(log.velocity_ref_rad_s is None and log.position_ref_rad is None for log in logs):
-        return _as_one(robot)
-    if not all(map(_told_by_speeds, logs)):
+        return _as_pi_velocity(robot)
+    if not all(map(_targets_are_summed_speeds, logs)):
         return robot
-    loop = _as_one(robot)
+    loop = _as_pi_velocity(robot)
     shown = other_controllers(loop, logs)
     return robot if any(cause.name == OTHER_GAINS[0] for cause in shown) else loop
 
 
-def _is_one(robot: Robot) -> bool:
+def _may_be_speed_loop(robot: Robot) -> bool:
     """Whether the law is sampled, uses speed references, and has two certain gains and no other option."""
     stated = tomlkit.parse(robot.toml).unwrap()["controller"]
     more = any(stated.get(name) for name in _MORE) or robot.stepped is not None
     return not more and robot.velocity_feedforward and not {"kp", "kd"} & robot.tolerances.keys()
 
 
-def _told_by_speeds(log: Log) -> bool:
+def _targets_are_summed_speeds(log: Log) -> bool:
     speed, target = log.velocity_ref_rad_s, log.position_ref_rad
     if speed is None:
         return False
@@ -70,7 +70,7 @@ def _told_by_speeds(log: Log) -> bool:
     return bool(np.all(np.ptp(off, axis=0) <= _SAME * np.maximum(np.ptp(target, axis=0), 1.0)))
 
 
-def _as_one(robot: Robot) -> Robot:
+def _as_pi_velocity(robot: Robot) -> Robot:
     gains = robot.controller_gains
     return _speed_loop(robot, np.asarray(gains["kd"]), np.asarray(gains["kp"]))
 
@@ -86,7 +86,7 @@ def other_controllers_of_targets(robot: Robot, logs: Sequence[Log]) -> tuple[Alg
     stated = tomlkit.parse(robot.toml).unwrap()["controller"]
     if any(stated.get(name) for name in _OF_THE_ROBOT):
         return ()
-    if not all(_tells(robot, log) for log in logs):
+    if not all(_shows_controller(robot, log) for log in logs):
         return ()
     found = other_controllers(robot, logs)
     try:
@@ -96,7 +96,7 @@ def other_controllers_of_targets(robot: Robot, logs: Sequence[Log]) -> tuple[Alg
     return found
 
 
-def _tells(robot: Robot, log: Log) -> bool:
+def _shows_controller(robot: Robot, log: Log) -> bool:
     if not log.has_torque or (log.position_ref_rad is None and log.velocity_ref_rad_s is None):
         return False
     if is_continuous(robot):

@@ -103,7 +103,7 @@ def either(causes: Sequence[NamedCause], unseen: float) -> tuple[tuple[str, str]
     Both gains are off by the same share. It is so small that the torque constant of a wrong sensor, ``unseen``
     up to that share, would not show.
     """
-    alone = [c for c in causes if c.effect == OTHER_GAINS[0] and _small_and_one(c, unseen)]
+    alone = [c for c in causes if c.effect == OTHER_GAINS[0] and _small_and_equal(c, unseen)]
     return tuple((c.label, Effect(TORQUE_SENSOR[0], c.axis).label) for c in alone)
 
 
@@ -115,7 +115,7 @@ def _has_both(gains: NamedCause) -> bool:
     return gains.parameters.keys() == set(OTHER_GAINS[1])
 
 
-def _small_and_one(gains: NamedCause, unseen: float) -> bool:
+def _small_and_equal(gains: NamedCause, unseen: float) -> bool:
     if not _has_both(gains):
         return False
     proportional, integral = (gains.parameters[name].value for name in OTHER_GAINS[1])

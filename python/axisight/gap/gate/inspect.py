@@ -88,7 +88,7 @@ def check_inputs(
     """
     check_names(despite)
     found: list[Finding] = []
-    for stage in (_machine, _logs, _against_simulator, _at_last):
+    for stage in (_machine, _logs, _against_simulator, _start_and_noise):
         found += flagged(stage(robot, estimation, validation), despite)
         if refused(found):
             break
@@ -118,7 +118,7 @@ def _against_simulator(robot: Robot, estimation: _Logs, validation: _Logs) -> li
     return [*_references(robot, logs), *found, *turned]
 
 
-def _at_last(robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding]:
+def _start_and_noise(robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding]:
     logs = [*estimation, *validation]
     start = check_start(robot, logs) if is_closed_loop(robot, logs) else []
     return [*start, *check_noise(robot, logs)]

@@ -79,7 +79,7 @@ def from_rest(
             findings = (_without_references(never, part),)
             return Begun(bare[:n], bare[n:], list(simulated), findings)
         parts.append(part)
-    return _taken(given, parts)
+    return _replaced(given, parts)
 
 
 def _moving(run_ups: _RunUps, logs: list[Log], *, simulates: bool) -> list[bool]:
@@ -154,7 +154,7 @@ class _RunUps:
         return self.to(log)
 
 
-def _taken(given: Begun, parts: Sequence[Log]) -> Begun:
+def _replaced(given: Begun, parts: Sequence[Log]) -> Begun:
     """Return the cut logs instead of the given ones, and the findings about them."""
     logs = [*given.estimation, *given.validation]
     sims = given.simulated
@@ -162,7 +162,7 @@ def _taken(given: Begun, parts: Sequence[Log]) -> Begun:
         pairs = zip(sims, logs, parts, strict=True)
         sims = [sim if part is log else sim.part(_first_s(log, part)) for sim, log, part in pairs]
     said = tuple(
-        _from(part, _first_s(log, part))
+        _starts_in_motion(part, _first_s(log, part))
         for log, part in zip(logs, parts, strict=True)
         if part is not log
     )
@@ -191,7 +191,7 @@ def first_rest_s(log: Log) -> float | None:
     return start
 
 
-def _from(log: Log, start_s: float) -> Finding:
+def _starts_in_motion(log: Log, start_s: float) -> Finding:
     if log.run_up is not None:
         return begins_in_motion(log, start_s)
     message = (

@@ -129,10 +129,10 @@ class Difference:
         dynamics, exact if simulator and machine move alike.
         """
         each = zip(logs, self.taken_nm, self.positions_rad, strict=True)
-        return [_less(log, u, x) for log, u, x in each]
+        return [_minus(log, u, x) for log, u, x in each]
 
 
-def _less(log: Log, torque_nm: Array, position_rad: Array) -> Log:
+def _minus(log: Log, torque_nm: Array, position_rad: Array) -> Log:
     run_up = None if log.run_up is None else log.run_up.less(position_rad[0], torque_nm[0])
     return replace(
         log,

@@ -53,9 +53,9 @@ def with_first_state(
     n = round(seconds / log.sample_time_s)
 
     def missed(tried: Array) -> Array:
-        return _missed(robot, log, tried, start_rad, n, compared)
+        return _errors(robot, log, tried, start_rad, n, compared)
 
-    moves = _moves(log, len(references))
+    moves = _changes(log, len(references))
     best = references
     left, *moved = missed(np.concatenate([best[None], best + moves]))
     columns = (np.array(moved) - left).T
@@ -71,7 +71,7 @@ def with_first_state(
     return best
 
 
-def _moves(log: Log, lead: int) -> Array:
+def _changes(log: Log, lead: int) -> Array:
     """Return the changes of ``lead`` references before a log (n_axes * n_shapes, lead, n_axes) [rad/s]."""
     assert log.velocity_ref_rad_s is not None  # closed loop only
     size = _TRIED * np.sqrt(np.mean(log.velocity_ref_rad_s**2, axis=0))
@@ -91,7 +91,7 @@ def _shapes(lead: int, step_s: float) -> Array:
     return np.asarray(np.diff(at, axis=0))
 
 
-def _missed(
+def _errors(
     robot: Robot, log: Log, tried: Array, start_rad: Array, n: int, compared: Compared
 ) -> Array:
     """Return the errors of simulations in the first ``n`` samples, over the log's standard deviation (n_tried, ...).

@@ -50,14 +50,14 @@ def begins(log: Log, noise_std: float | Array) -> Begins:
     """
     if log.n_samples <= _FEWEST:
         return "rest"
-    found, n = set(_of_first(log, _FEWEST, noise_std)), 2 * _FEWEST
+    found, n = set(_start_of_axes(log, _FEWEST, noise_std)), 2 * _FEWEST
     while n * log.sample_time_s <= _LONGEST_S and n < log.n_samples:
-        found |= set(_of_first(log, n, noise_std))
+        found |= set(_start_of_axes(log, n, noise_std))
         n *= 2
     return "motion" if "motion" in found else "open" if "open" in found else "rest"
 
 
-def _of_first(log: Log, n: int, noise_std: float | Array) -> list[Begins]:
+def _start_of_axes(log: Log, n: int, noise_std: float | Array) -> list[Begins]:
     """Return how each axis of a log starts, from the parabola through its first ``n`` positions."""
     step, first = log.sample_time_s, log.position_rad[:n]
     powers = np.vander(step * np.arange(n), 3, increasing=True)
@@ -91,10 +91,12 @@ def torque_is_from_rest(robot: Robot, log: Log) -> bool:
     At rest, missing effects do not change the torque unless they are constant. If the constant torque is off
     too, the answer is False.
     """
-    resting = _from_rest(robot, log, _few(log))
+    resting = _torques_from_rest(robot, log, _response_samples(log))
     if resting is None:
         return False
-    missed = ((log.torque_nm[: _few(log)] - resting) / _noise_nm(log))[:, _that_move(log)]
+    missed = ((log.torque_nm[: _response_samples(log)] - resting) / _noise_nm(log))[
+        :, _moving_axes(log)
+    ]
     return bool(np.all(np.abs(missed.mean(axis=0)) < _NOISES / np.sqrt(len(missed))))
 
 
@@ -109,21 +111,21 @@ def run_up_is_better(robot: Robot, log: Log, run_up: Log) -> bool:
     references = run_up.led("velocity_ref_rad_s")[: lead + n]
     assert run_up.start_rad is not None  # run_up_to sets both
     moving = _first_torques(robot, references, run_up.start_rad, n)
-    resting = _from_rest(robot, log, n)
+    resting = _torques_from_rest(robot, log, n)
     if moving is None or resting is None:
         return moving is not None
-    axes, noise = _that_move(log), _noise_nm(log)
+    axes, noise = _moving_axes(log), _noise_nm(log)
     missed = ((log.torque_nm[:n] - resting) / noise)[:, axes]
     apart = ((moving - resting) / noise)[:, axes]
-    return _has(missed, apart, _few(log))
+    return _shows_half(missed, apart, _response_samples(log))
 
 
-def _few(log: Log) -> int:
+def _response_samples(log: Log) -> int:
     """Return the number of samples in which a loop responds to a step of its reference."""
     return max(1, round(_LONGEST_S / log.sample_time_s))
 
 
-def _from_rest(robot: Robot, log: Log, n: int) -> Array | None:
+def _torques_from_rest(robot: Robot, log: Log, n: int) -> Array | None:
     """Return the first ``n`` torques (n, n_axes) [Nm] of a simulation from rest; None if it is unstable."""
     assert log.velocity_ref_rad_s is not None  # closed loop only
     at_rest = start_of(robot, log.position_rad[0])
@@ -140,7 +142,7 @@ def _first_torques(robot: Robot, references: Array, start_rad: Array, n: int) ->
     return None if len(torque) < len(references) else torque[-n:]
 
 
-def _that_move(log: Log) -> NDArray[np.bool_]:
+def _moving_axes(log: Log) -> NDArray[np.bool_]:
     """Return whether an axis of a log moves (n_axes,)."""
     travel = np.ptp(log.position_rad, axis=0)
     return np.asarray(travel > STANDS * travel.max())
@@ -152,7 +154,7 @@ def _noise_nm(log: Log) -> Array:
     return np.maximum(white_std(log.torque_nm, log.sample_time_s), max(_NOISELESS * size, 1e-300))
 
 
-def _has(missed: Array, apart: Array, least: int) -> bool:
+def _shows_half(missed: Array, apart: Array, least: int) -> bool:
     """Whether errors contain more than half of the difference between two simulations.
 
     ``missed``: log minus simulation from rest; ``apart``: difference of the simulations; (n, n_axes) each, over

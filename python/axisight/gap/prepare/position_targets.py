@@ -52,7 +52,7 @@ class Commanded:
 
     def as_logged(self) -> list[Log]:
         """Return the logs at their own rate."""
-        return [_every(log, self.step) for log in self.logs]
+        return [_thinned(log, self.step) for log in self.logs]
 
     def of(self, logs: Sequence[Log]) -> list[Log]:
         """Return other logs, one for each and at the logged rate, with commands at the controller's rate."""
@@ -122,10 +122,10 @@ def with_commands(robot: Robot, logs: Sequence[Log]) -> Commanded | None:
     known = known or (_is_cascade(robot) and step == 1)
     fed = robot.velocity_feedforward and known
     at_start = robot.with_operating_point(start * robot.gear_ratio)
-    machine = _as_its_steps_make_it(at_start).with_velocity_feedforward(fed)
+    machine = _with_step_inertia(at_start).with_velocity_feedforward(fed)
     begun = at_their_poses(machine, logs)
     whole = [_commanded(machine, log, step) for log in begun]
-    told = [_from_start(machine, fine, log, step) for fine, log in zip(whole, logs, strict=True)]
+    told = [_with_run_up(machine, fine, log, step) for fine, log in zip(whole, logs, strict=True)]
     from_s = [
         (a.n_samples - b.n_samples) * a.sample_time_s for a, b in zip(whole, told, strict=True)
     ]
@@ -137,7 +137,7 @@ def _is_cascade(robot: Robot) -> bool:
     return "kv" in robot.controller_gains
 
 
-def _from_start(machine: Robot, told: Log, log: Log, step: int) -> Log:
+def _with_run_up(machine: Robot, told: Log, log: Log, step: int) -> Log:
     """Return a log with commands, with a run-up if ``log`` starts in motion.
 
     Raises InputError if no run-up is possible.
@@ -155,7 +155,7 @@ def _from_start(machine: Robot, told: Log, log: Log, step: int) -> Log:
         ) from error
 
 
-def _as_its_steps_make_it(robot: Robot) -> Robot:
+def _with_step_inertia(robot: Robot) -> Robot:
     """Return a robot with the motor inertia changed by the simulator's integration step; a machine unchanged."""
     if robot.stepped is None:
         return robot
@@ -297,7 +297,7 @@ def _fed_dynamics(robot: Robot, position: Array, rate: Array) -> Array:
     return np.asarray(torque - torque[0])
 
 
-def _every(log: Log, step: int) -> Log:
+def _thinned(log: Log, step: int) -> Log:
     """Return every ``step``-th sample of a log."""
     reference, target = log.velocity_ref_rad_s, log.position_ref_rad
     velocity = log.velocity_rad_s

@@ -62,7 +62,7 @@ def run_up_to(
     if not all(np.isfinite(signal).all() for signal in signals):
         raise NotRunUpError(f"{log.name}: signals that are not finite")
     seen = max(_SEEN_SAMPLES, round(_SEEN_S / log.sample_time_s), _SEEN_STEPS * step)
-    position = _first(log.position_rad, log.sample_time_s, seen, 2)[0]
+    position = _start_polynomial(log.position_rad, log.sample_time_s, seen, 2)[0]
     try:
         pose = start_of(robot, position)
         burn_s = _burn_in_s(log, min(slowest_decay_1_s(r, pose) for r in loops), step)
@@ -74,10 +74,10 @@ def run_up_to(
         raise
     except InputError as error:
         raise NotRunUpError(f"{log.name}: no run-up from rest ({error})") from error
-    return _behind(replace(log, run_up=run_up, start_rad=start_rad), burn_s)
+    return _cut_after(replace(log, run_up=run_up, start_rad=start_rad), burn_s)
 
 
-def _first(signal: Array, step_s: float, seen: int, order: int) -> Array:
+def _start_polynomial(signal: Array, step_s: float, seen: int, order: int) -> Array:
     """Return the polynomial through the first ``seen`` samples of a signal, (order + 1, n_axes), constant first."""
     n = min(seen, len(signal))
     return np.polynomial.polynomial.polyfit(step_s * np.arange(n), signal[:n], order)
@@ -103,7 +103,7 @@ def _references(log: Log, seen: int) -> Array:
     time = log.sample_time_s
     m = max(round(RUN_UP_S / time), LEAST_SAMPLES)
     s = (np.arange(m) / m)[:, None]
-    first, rate = _first(log.velocity_ref_rad_s, time, seen, 1)
+    first, rate = _start_polynomial(log.velocity_ref_rad_s, time, seen, 1)
     return np.asarray(first * s**2 * (3 - 2 * s) - rate * m * time * s**2 * (1 - s))
 
 
@@ -141,15 +141,15 @@ def _angle_error(robot: Robot, log: Log, held_nm: Array, burn_s: float) -> Array
     missed = log.torque_nm - law
     if "kv" not in gains:
         seen = round(burn_s / time)
-        return _over(missed[:seen].mean(axis=0) - held_nm, ki)
+        return _quotient(missed[:seen].mean(axis=0) - held_nm, ki)
     at = time * np.arange(log.n_samples)
     offset, slope = np.polynomial.polynomial.polyfit(at, missed, 1)
     kv, kp = np.asarray(gains["kv"]), np.asarray(gains["kp"])
-    summed = _over(slope, ki * kv)
-    return np.where(ki > 0, summed, _over(offset - held_nm, kp * kv))
+    summed = _quotient(slope, ki * kv)
+    return np.where(ki > 0, summed, _quotient(offset - held_nm, kp * kv))
 
 
-def _over(x: Array, by: Array) -> Array:
+def _quotient(x: Array, by: Array) -> Array:
     """Return a quotient; zero where the divisor is not positive."""
     return np.asarray(np.where(by > 0, x / np.where(by > 0, by, 1.0), 0.0))
 
@@ -166,7 +166,7 @@ def _run_up(robot: Robot, log: Log, position: Array, references: Array, start_ra
     return made.less(next_position - position, torque[-1] - next_torque)
 
 
-def _behind(log: Log, burn_s: float) -> Log:
+def _cut_after(log: Log, burn_s: float) -> Log:
     """Return a log from ``burn_s`` [s] on; the part before it is added to the run-up."""
     rest = log.part(burn_s)
     n = log.lead + log.n_samples - rest.n_samples

@@ -202,7 +202,7 @@ def records_of(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> li
     """Return the records of logs with which a simulator kept on them is compared."""
     certain = certainties(tracking, logs, weighting)
     stepped = encoder_steps(tracking, logs) > 0
-    forgets_s = _forgets_s(tracking) if stepped.any() else 0.0
+    forgets_s = _memory_s(tracking) if stepped.any() else 0.0
     out = []
     for log, c in zip(logs, certain, strict=True):
         if log.run_up is not None:
@@ -228,7 +228,7 @@ def _at_edges(log: Log, forgets_s: float) -> NDArray[np.bool_]:
     return np.asarray((time_s < first_s) | (time_s > last_s))
 
 
-def _forgets_s(tracking: Robot) -> float:
+def _memory_s(tracking: Robot) -> float:
     """Return how long [s] a loop remembers its initial state.
 
     A motor that is held between two encoder steps moves between them before a log starts. Its speed at the

@@ -117,7 +117,7 @@ class InverseView(View):
         self, model: FittedModel, *, axes: Collection[int] | None = None
     ) -> list[Hypothesis]:
         """Return the candidates of `View` whose turn it is beside the causes of ``model``."""
-        return [f for f in super().candidates(model, axes=axes) if _in_its_turn(f.effect, model)]
+        return [f for f in super().candidates(model, axes=axes) if _is_tried(f.effect, model)]
 
     def measured(self, log: Log) -> Array:
         """Return the low-passed torque (n, n_axes) [Nm]."""
@@ -201,7 +201,7 @@ class InverseView(View):
         return tuple(out)
 
 
-def _in_its_turn(effect: Effect, model: FittedModel) -> bool:
+def _is_tried(effect: Effect, model: FittedModel) -> bool:
     """Whether an effect is tried beside the causes of a model by inverse dynamics.
 
     On a real machine, errors of formulas look like a lag beside another cause, and like an effect that changes

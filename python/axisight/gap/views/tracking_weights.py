@@ -83,10 +83,10 @@ class TrackingWeights:
     ) -> None:
         self.model_error = model_error
         from_angle, kept = loop_responses(tracking, frequency_hz)
-        self.noise = smoothed(sampled, _answer(from_angle, std_rad))
+        self.noise = smoothed(sampled, _noise_response(from_angle, std_rad))
         from_angle, commanded = loop_responses(own, frequency_hz)
         self._passed = _of_axes(kept) / _of_axes(commanded)
-        self._answer = _answer(from_angle, std_rad)
+        self._noise_response = _noise_response(from_angle, std_rad)
 
     def of(self, torques: Sequence[Array], like: Log) -> Array:
         """Return the weights (n_axes, n_freq) for logged torques, with segments as for the log ``like``."""
@@ -104,7 +104,7 @@ class TrackingWeights:
         This is the bias of direct identification in closed loop (Forssell and Ljung, 1999). Torque that
         responds to noise therefore gets no weight.
         """
-        share = 1.0 - _AS_ANSWER * self._answer / np.maximum(torque, 1e-300)
+        share = 1.0 - _AS_ANSWER * self._noise_response / np.maximum(torque, 1e-300)
         share[:, :SLOW] = 1.0
         return np.asarray(np.clip(share, _LEAST_DRIVEN, 1.0))
 
@@ -116,7 +116,7 @@ def _density(torques: Sequence[Array], like: Log) -> tuple[Array, Array]:
     return found[0][0], np.asarray(np.mean([density for _, density in found], axis=0))
 
 
-def _answer(from_angle: Complex, std_rad: Array) -> Array:
+def _noise_response(from_angle: Complex, std_rad: Array) -> Array:
     """Return the density of the torque's linear response to sensor noise (n_axes, n_freq)."""
     return np.asarray(np.einsum("fij,j->if", np.abs(from_angle) ** 2, std_rad**2))
 

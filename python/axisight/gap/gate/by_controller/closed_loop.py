@@ -47,7 +47,7 @@ class _Axis:
 def check_closed_loop(robot: Robot, log: Log) -> list[Finding]:
     """Return findings about channels that contradict the controller's law."""
     law = ControlLaw(robot, log)
-    looked = [_look(law, i, robot.n_axes) for i in range(robot.n_axes)]
+    looked = [_examined(law, i, robot.n_axes) for i in range(robot.n_axes)]
     out: list[Finding] = []
     unexplained = []
     for axis in looked:
@@ -67,7 +67,7 @@ def check_closed_loop(robot: Robot, log: Log) -> list[Finding]:
     return _once(out)
 
 
-def _look(law: ControlLaw, i: int, n_axes: int) -> _Axis:
+def _examined(law: ControlLaw, i: int, n_axes: int) -> _Axis:
     as_given = law.fit(i, i, i)
     if not as_given.explained < HOLDS:
         return _Axis(i, as_given, i, i, as_given, None)
@@ -76,14 +76,14 @@ def _look(law: ControlLaw, i: int, n_axes: int) -> _Axis:
     fits = [(law.fit(i, j, i), j, i) for j in others]
     fits += [(law.fit(i, i, j), i, j) for j in others]
     fits += [(law.fit(i, j, j, gains=j), j, j) for j in others]
-    good = [f for f in fits if _believed(f[0])]
+    good = [f for f in fits if _law_holds(f[0])]
     if good:
         best, j, k = max(good, key=lambda f: f[0].explained)
         return _Axis(i, as_given, j, k, best, None)
-    return _Axis(i, as_given, i, i, as_given, best_shift(law, i, _believed))
+    return _Axis(i, as_given, i, i, as_given, best_shift(law, i, _law_holds))
 
 
-def _believed(fit: LawFit) -> bool:
+def _law_holds(fit: LawFit) -> bool:
     """Whether a law holds, with factors of reference and position near one."""
     factors = [x for x in (fit.reference, fit.position) if math.isfinite(x)]
     return fit.explained >= HOLDS and all(_within(x, _ONE) for x in factors)
