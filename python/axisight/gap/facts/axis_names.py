@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from axisight.effects import effect_info, noun, phrase
+from axisight.effects import article, effect_info, noun, phrase
 
 # Names that say no more than the number of the axis.
 _PLAIN = re.compile(r"(?:axis|joint|j|a|q)?[ _-]?0*(\d+)", re.IGNORECASE)
@@ -14,11 +14,11 @@ _MENTION = re.compile(r"\b([Aa]xis|[Aa]xes) (\d+(?:(?:, | and )\d+)*)")
 _MOST = 3
 # Share by which a gap may lie above its floor and be noise all the same: both are measured.
 _NOISE = 0.1
-# A gap is clear from this many times the floor, and from this far above it [1]. The re-fit removes it where it
-# removes this share of what is above the floor, in squares.
+# A gap is clear from this many times the floor, and from this far above it [1]. It is removed where this share of
+# what is above the floor goes, in squares.
 _CLEAR, _SEEN, _REMOVED = 1.5, 0.02, 0.75
-# Share of what is above the floor, in squares, of which causes have to remove more on an axis they explain.
-_HALF = 0.5
+# Article of what is the machine's own.
+_OWN = "the machine's"
 
 
 def own_name(axis: int, names: Sequence[str]) -> str:
@@ -38,7 +38,7 @@ def placed(label: str) -> str:
     """Return the label of a candidate in words, such as "backlash on axis 2" or "another link mass on axis 1"."""
     effect, _, axes = label.partition("@")
     what = f"another {noun(effect)}" if always_there(effect) else phrase(effect)
-    what = what.removeprefix("the machine's ")
+    what = what.removeprefix(f"{_OWN} ")
     first, _, second = axes.partition(",")
     where = f" on axes {first} and {second}" if second else f" on axis {first}" if first else ""
     return f"{what}{where}"
@@ -47,9 +47,8 @@ def placed(label: str) -> str:
 def always_there(effect: str) -> bool:
     """Whether every simulator has what an effect changes: a share of its own values, or a link of its arm."""
     info = effect_info(effect)
-    of_a_link = info.acts == "arm" and info.family == "load"
-    share = info.parameters[0].name.startswith("relative_")
-    return info.scope == "axis" and (of_a_link or share)
+    own = article(effect) == _OWN and info.scope == "axis"
+    return own and (info.acts == "arm" or info.parameters[0].name.startswith("relative_"))
 
 
 def with_joints(text: str, names: Sequence[str]) -> str:
@@ -75,6 +74,11 @@ def at_floor(gap: float, floor: float) -> bool:
     return gap <= (1 + _NOISE) * floor
 
 
+def hides_all(floor: float) -> bool:
+    """Whether noise is so large a share of the torque [1] that not even a gap of all of it would be clear."""
+    return _CLEAR * floor >= 1.0
+
+
 def verdict_word(verdict: str, row: Sequence[float]) -> str:
     """Return the verdict of an axis in words, beside its ``row`` of the gap: before, re-fitted, after, floor [1].
 
@@ -83,7 +87,7 @@ def verdict_word(verdict: str, row: Sequence[float]) -> str:
     | word | where |
     |---|---|
     | ``at the floor`` | the re-fitted simulator has no gap there that the causes could explain |
-    | ``above the floor`` | a clear gap is left there, and the causes remove less than half of it (in squares) |
+    | ``above the floor`` | a clear gap is left there, and less than three quarters of it (in squares) are removed |
     """
     before, refitted, after, floor = row
     if verdict != "explained":
@@ -92,7 +96,7 @@ def verdict_word(verdict: str, row: Sequence[float]) -> str:
         return "at the floor"
     left, all_of_it = after**2 - floor**2, before**2 - floor**2
     clear = after > _CLEAR * floor and left > _SEEN**2
-    return "above the floor" if clear and left > _HALF * all_of_it else verdict
+    return "above the floor" if clear and left > (1 - _REMOVED) * all_of_it else verdict
 
 
 def removed_by_refit(

@@ -254,8 +254,6 @@ def findings(
 
 # Ratio of weighted residuals from which an axis takes the lead over the axis with the largest plain error.
 _BY_FAR = 3.0
-# From where that is worth telling.
-_TOLD = 1.0
 
 
 def led_by_weight(
@@ -287,7 +285,7 @@ def led_by_weight(
         placed(bands, regimes, int(k), float(shares[k]), significance, of) for k in (i, *others)
     )
     told = ""
-    if excess[i] >= _TOLD:
+    if excess[i] >= _BY_FAR:
         told = f"; largest residual of all axes against noise, {excess[i]:.3g} times the floor"
     return (replace(leader, evidence=leader.evidence + told), *rest)
 

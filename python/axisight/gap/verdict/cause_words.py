@@ -11,10 +11,8 @@ from axisight.gap.facts.wording import listed
 
 # Numbers of axes in words.
 _COUNTS = {2: "both", 3: "all three", 4: "all four", 5: "all five", 6: "all six", 7: "all seven"}
-# Phrases of a list that are told; more are counted.
-_MOST = 4
-# Axes whose wrong values are told by number.
-_NUMBERED = 3
+MOST = 4
+"""Items of a list that a sentence tells: effects, wrong values, changes of the re-fit. More are counted."""
 
 
 def in_order(causes: Sequence[Cause]) -> list[Cause]:
@@ -29,7 +27,7 @@ def named(causes: Sequence[Cause], n_axes: int = 0) -> str:
     ``n_axes``: of the robot. Effects that differ by an adjective and have the same axes share a phrase:
     "Coulomb and viscous friction".
     """
-    return listed(_told(_phrases(causes, n_axes)))
+    return listed(told(_phrases(causes, n_axes)))
 
 
 def labels_in_words(labels: Sequence[str], n_axes: int) -> str:
@@ -52,7 +50,7 @@ def sure(causes: Sequence[Cause], own: Sequence[Effect], n_axes: int) -> str:
     lacking = [c for c in in_order(causes) if c not in wrong]
     out = [f"The simulator lacks {named(lacking, n_axes)}."] if lacking else []
     if wrong:
-        text = listed(_told(_wrong(wrong, own, n_axes)))
+        text = listed(told(_wrong(wrong, own, n_axes)))
         out.append(f"{text[:1].upper()}{text[1:]}.")
     return " ".join(out)
 
@@ -93,11 +91,11 @@ def _of_simulator(cause: Cause, own: Sequence[Effect]) -> Effect | None:
     return next(same, None)
 
 
-def _told(phrases: Sequence[str]) -> list[str]:
-    """Return phrases as far as a sentence bears them."""
-    if len(phrases) <= _MOST:
+def told(phrases: Sequence[str], rest: str = "more effects") -> list[str]:
+    """Return phrases as far as a sentence bears them, and how many are the ``rest``."""
+    if len(phrases) <= MOST:
         return list(phrases)
-    return [*phrases[: _MOST - 1], f"{len(phrases) - _MOST + 1} more effects"]
+    return [*phrases[: MOST - 1], f"{len(phrases) - MOST + 1} {rest}"]
 
 
 def _phrases(causes: Sequence[Cause], n_axes: int) -> list[str]:
@@ -134,8 +132,8 @@ def _wrong(causes: Sequence[Cause], own: Sequence[Effect], n_axes: int) -> list[
         mine = [c for c in causes if c.effect == effect]
         where = place([a for c in mine for a in axes_of(c)], n_axes)
         numbers = [text for c in mine if (text := _of_machine(c, _of_simulator(c, own)))]
-        told = 0 < len(numbers) == len(mine) <= _NUMBERED
-        machine = f" (machine: {listed(numbers)})" if told else ""
+        few = 0 < len(numbers) == len(mine) <= MOST
+        machine = f" (machine: {listed(numbers)})" if few else ""
         out.append(
             f"the {noun(effect)}{f' of {where}' if where else ''} is wrong in the simulator{machine}"
         )

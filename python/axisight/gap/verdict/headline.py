@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from axisight.effects import Effect, effect_info
-from axisight.gap.facts.axis_names import at_floor, placed, removed_by_refit, with_joints
+from axisight.gap.facts.axis_names import at_floor, hides_all, placed, removed_by_refit, with_joints
 from axisight.gap.facts.compared_quantity import gap_of, torque_of
 from axisight.gap.facts.result import (
     AxisVerdict,
@@ -24,6 +24,7 @@ from axisight.gap.facts.result import (
 from axisight.gap.facts.withdrawal import Withdrawal
 from axisight.gap.facts.wording import listed, percent
 from axisight.gap.verdict.cause_words import (
+    MOST,
     axes_of,
     deed,
     in_order,
@@ -31,18 +32,12 @@ from axisight.gap.verdict.cause_words import (
     named,
     place,
     sure,
+    told,
 )
 
 __all__ = ["Facts", "clear_changes", "headline", "in_order", "named", "within_tolerances"]
 
 _Groups = tuple[tuple[str, ...], ...]
-
-# Share of the torque from which noise hides most of what could be missing on an axis.
-_LOUD = 0.5
-# Rivals of a group, groups, and axes that a sentence names.
-_RIVALS, _GROUPS, _AXES = 3, 2, 3
-# Changes of the re-fit that are told by name.
-_TOLD = 4
 
 
 @dataclass(frozen=True)
@@ -98,8 +93,8 @@ def clear_changes(refit: Mapping[str, Interval]) -> list[str]:
     """Return re-fitted parameters with their change, the largest first, where its 95 % interval leaves out zero."""
     clear = {k: p for k, p in refit.items() if p.low > 0 or p.high < 0}
     largest = sorted(clear.items(), key=lambda item: -abs(item[1].value))
-    told = [f"{k} {100 * p.value:+.2g} %" for k, p in largest[:_TOLD]]
-    return told if len(largest) <= _TOLD else [*told, f"and {len(largest) - _TOLD} more"]
+    changes = [f"{k} {100 * p.value:+.2g} %" for k, p in largest[:MOST]]
+    return changes if len(largest) <= MOST else [*changes, f"and {len(largest) - MOST} more"]
 
 
 def _no_verdict(facts: Facts) -> list[str]:
@@ -135,7 +130,7 @@ def _none(facts: Facts) -> list[str]:
             f"The re-fitted simulator leaves {percent(gap.refitted)} of the {_torque(facts)} on validation logs "
             f"(noise alone: {percent(gap.floor)})."
         )
-    loud = [i for i, x in enumerate(gap.floor_per_axis.tolist(), start=1) if x >= _LOUD]
+    loud = [i for i, x in enumerate(gap.floor_per_axis.tolist(), start=1) if hides_all(x)]
     if loud:
         most = percent(float(max(gap.floor_per_axis)))
         out.append(
@@ -157,15 +152,12 @@ def _explained(facts: Facts) -> list[str]:
 def _open(facts: Facts) -> str:
     if not facts.open:
         return ""
-    pairs = []
-    for group in facts.open[:_GROUPS]:
-        rivals = [placed(label) for label in group[:_RIVALS]]
-        if len(group) > _RIVALS:
-            rivals.append(f"{len(group) - _RIVALS} others")
-        pairs.append(listed(rivals, "or"))
-    more = len(facts.open) - _GROUPS
-    pairs += [f"{more} more such choice{'s' if more > 1 else ''}"] if more > 0 else []
-    return f"Open: {'; '.join(pairs)}. These logs cannot tell them apart."
+    choices = [
+        listed(told([placed(label) for label in group], "others"), "or") for group in facts.open
+    ]
+    return (
+        f"Open: {'; '.join(told(choices, 'more such choices'))}. These logs cannot tell them apart."
+    )
 
 
 def _effect(facts: Facts) -> str:

@@ -159,10 +159,10 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
                 ("backlash@3", "lost_motion@3"),
             ),
         ),
-        "Open: another link mass on axis 1 (pan), a payload, another link inertia on axis 1 or 2 others; "
-        "Coulomb friction on axis 2 (shoulder) or a torque offset on axis 2; 1 more such choice. These logs cannot "
-        "tell them apart. With the first of each the gap on validation logs goes from 91.3 % to 3.9 % of the torque "
-        "(noise alone: 3.5 %).",
+        "Open: another link mass on axis 1 (pan), a payload, another link inertia on axis 1 or 2 others; Coulomb "
+        "friction on axis 2 (shoulder) or a torque offset on axis 2; backlash on axis 3 (elbow) or lost motion on "
+        "axis 3. These logs cannot tell them apart. With the first of each the gap on validation logs goes from "
+        "91.3 % to 3.9 % of the torque (noise alone: 3.5 %).",
     ),
     "unknown on one axis of six": (
         UNKNOWN,
