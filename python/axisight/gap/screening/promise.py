@@ -37,14 +37,14 @@ def promising(starts: Sequence[Start], worth: Array) -> list[Start]:
             for k, s in enumerate(mine)
             if s.gain > least and (k < _FITTED or (k < 2 * _FITTED and s.gain > _NEAR * best[axis]))
         ]
-        keep += [s for s in _at_home(mine, least) if all(s is not k for k in keep)]
+        keep += [s for s in _best_at_home(mine, least) if all(s is not k for k in keep)]
     of_the_arm = least_of_the_arm(worth, best)
     keep += [s for s in ranked if s.falls is not None and np.any(s.falls > of_the_arm)]
     # If no candidate reaches the threshold, the report still names the best ones that were tried.
     return keep or ranked[:_LOOKED_AT]
 
 
-def _at_home(mine: Sequence[Start], least: float) -> list[Start]:
+def _best_at_home(mine: Sequence[Start], least: float) -> list[Start]:
     """Return the best candidates of an axis by their gain on that axis.
 
     Only candidates whose total gain is above the threshold ``least`` take part. The next axis may gain most from a

@@ -98,15 +98,15 @@ def others_of_its_gear(
     if laws != [leader] or name is None:
         return []
     near = _NEAR * best.score
-    done = {r.trial.label for r in standing.ranked if r.score >= near and _in_place(r.trial)}
+    done = {r.trial.label for r in standing.ranked if r.score >= near and _is_final_fit(r.trial)}
     stiffness = fitted.robot_values.get(name, robot_parameters(robot)[name])
     if _held_first(leader.name):
-        if not _in_place(best.trial):
+        if not _is_final_fit(best.trial):
             options = [o for o in options if o.effect.name == leader.name]
         elif best.score >= _NEAR:
             return []
     begun = (
-        on_the_curve(leader, _damped_too(option, leader), stiffness)
+        on_the_curve(leader, _with_held_free(option, leader), stiffness)
         for option in options
         if option.effect.axis == axis and option.effect.label not in done
     )
@@ -117,7 +117,7 @@ def others_of_its_gear(
     ]
 
 
-def _in_place(one: FittedHypothesis) -> bool:
+def _is_final_fit(one: FittedHypothesis) -> bool:
     """Whether a fitted law has sensitivities of its own and all its parameters free."""
     return one.fitted.renewed and not _still_held(one.hypothesis)
 
@@ -132,7 +132,7 @@ def _still_held(option: Hypothesis) -> list[str]:
     return [name for name in _held_first(option.effect.name) if name not in option.free]
 
 
-def _damped_too(option: Hypothesis, leader: Effect) -> Hypothesis:
+def _with_held_free(option: Hypothesis, leader: Effect) -> Hypothesis:
     """Return a law with its held parameters free, started at the leader's values; other laws unchanged."""
     held = _still_held(option)
     if not held:
@@ -191,14 +191,14 @@ def on_the_curve(
         for b in begun
     ]
     closest = min(found, key=lambda r: float(r.cost))
-    bend, left = (_bend(torque, x) for x in (wanted, closest.fun[:-1]))
+    bend, left = (_rms_off_line(torque, x) for x in (wanted, closest.fun[:-1]))
     if left > max(_FOLLOWED * bend, _STRAIGHT):
         return None
     share, *best = (closest.x * scale).tolist()
     return option.at(dict(zip(free, best, strict=True))), share
 
 
-def _bend(torque: Array, deflection: Array) -> float:
+def _rms_off_line(torque: Array, deflection: Array) -> float:
     """Return the rms distance of a deflection from a straight line over the torque."""
     centred = torque - torque.mean()
     line = centred * float(centred @ deflection) / float(centred @ centred)

@@ -30,16 +30,18 @@ def begun_sticking(
     begun: list[tuple[FittedModel, Hypothesis]] = []
     for standing in standings:
         for name, later in sticking:
-            yielding = _yielding(standing, name, later)
+            yielding = _law_without_stiction(standing, name, later)
             falling = _named(options, Effect(later.as_of, standing.axis + 1).label)
             if yielding is not None and falling is not None:
                 fitted = yielding.trial.fitted
-                of_law = _sticking(yielding.trial.hypothesis, fitted.effects[-1], later, falling)
+                of_law = _with_stiction(
+                    yielding.trial.hypothesis, fitted.effects[-1], later, falling
+                )
                 begun += [(fitted, option) for option in of_law]
     return begun
 
 
-def _sticking(
+def _with_stiction(
     yielding: Hypothesis, fitted: Effect, later: Later, falling: Hypothesis
 ) -> list[Hypothesis]:
     """Return a law with its later parameters free, once for each start value of the shape that ``falling`` has."""
@@ -62,7 +64,9 @@ def _sticking(
     ]
 
 
-def _yielding(standing: AxisPosterior, name: str, later: Later) -> RankedHypothesis | None:
+def _law_without_stiction(
+    standing: AxisPosterior, name: str, later: Later
+) -> RankedHypothesis | None:
     """Return the fitted law ``name`` without its later parameters, if a law of its family leads the axis; else None.
 
     None also if it leaves too little of the error.

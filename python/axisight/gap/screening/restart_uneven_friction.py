@@ -43,11 +43,13 @@ def begun_wider(
             tried = label in known and known[label].fitted.total <= even.fitted.total
             if effect.name == begun.law and not tried:
                 options = (o for o in offered(even.fitted) if o.effect.label == label)
-                out += [(even.fitted, option.at(_as_even(effect, begun))) for option in options]
+                out += [
+                    (even.fitted, option.at(_from_uniform(effect, begun))) for option in options
+                ]
     return out
 
 
-def _as_even(even: Effect, begun: BegunFrom) -> dict[str, float]:
+def _from_uniform(even: Effect, begun: BegunFrom) -> dict[str, float]:
     """Return the values that position-dependent friction takes over from uniform friction."""
     values = even.parameters or {}
     return {taken: values[name] for name, taken in begun.takes.items() if name in values}

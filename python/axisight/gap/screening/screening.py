@@ -30,7 +30,7 @@ A = TypeVar("A")
 _TOGETHER = 4
 # Largest number of evaluations between two start values of an effect.
 _SCANS = 10
-# Share of the loss that the first start of an acting candidate must promise. Each further start costs a simulation.
+# Share of the loss that the first start must promise if it has an effect: each further start then costs a simulation.
 _LEAST_GAIN = 0.002
 # The logs of the last screening stay in use if they hold this share of the error that the same number of logs can hold.
 _NEARLY = 0.8

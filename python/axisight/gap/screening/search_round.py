@@ -214,7 +214,7 @@ class SearchRound:
         found = self.fitter.fit(begun.free, begun, max_iterations=_LOOKS)
         if isinstance(found, Diverged):
             return found
-        # Sensitivities of an unsettled fit do not count as its own. If it becomes a cause, it is fitted on.
+        # An unsettled fit does not count as renewed: if it becomes a cause, it is fitted on.
         return replace(found, renewed=found.renewed and has_settled(found))
 
     def run_waiting(
@@ -341,7 +341,7 @@ class SearchRound:
     ) -> list[FittedHypothesis]:
         """Return the leaders to refine next: two where a leader bends the own parameters, else one.
 
-        Once a leader has sensitivities of its own, it may bend them no more.
+        A leader with sensitivities of its own may bend them no more, so this is checked anew each time.
         """
         crooked = self._bent_axes(trials)
         todo = self._worth_refining(trials, crooked, even_felt=even_felt)
