@@ -54,7 +54,7 @@ class Layout:
         """Return how sure a fall of loss by block (n_blocks,) is, in standard deviations of a normal.
 
         The fall is summed over the axes, or one ``axis`` (from 0), in each stretch of time. It is compared with its
-        scatter between the stretches of one log: an effect that shows in one log only is no less sure.
+        scatter between the stretches of one log: an effect that shows in one log only is no less sure for that.
 
         An effect may show in a few loud stretches only, or one loud stretch may hide it. So the test is made with
         absolute falls and with falls relative to the loss of each stretch, and the larger value counts.

@@ -61,7 +61,7 @@ def _groups(fitted: FittedModel) -> NDArray[np.int64]:
     if len(logs) == 1:
         return np.arange(len(number)) % _INTERLEAVED
     groups = number * _STRETCHES
-    for log in _alone(fitted, number):
+    for log in _only_sources(fitted, number):
         for axis in np.unique(fitted.axis):
             # The blocks of one axis of a log are in the order of time.
             here = np.flatnonzero((number == log) & (fitted.axis == axis))
@@ -69,7 +69,7 @@ def _groups(fitted: FittedModel) -> NDArray[np.int64]:
     return groups
 
 
-def _alone(fitted: FittedModel, number: NDArray[np.int64]) -> NDArray[np.int64]:
+def _only_sources(fitted: FittedModel, number: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the numbers of the logs that hold nearly all information on every parameter of the effects.
 
     Every parameter, so that a law with one number more is scored in the same groups as the simpler law.
@@ -195,7 +195,7 @@ def linear_step(fitted: NormalEquations) -> Array:
     """
     matrix = fitted.matrix.sum(axis=0) + fitted.prior_matrix
     gradient = fitted.gradient.sum(axis=0) + fitted.prior_gradient
-    movable = (np.diag(matrix) > 0) & ~_at_end(fitted)
+    movable = (np.diag(matrix) > 0) & ~_at_hard_bound(fitted)
     free, (least, most) = movable.copy(), _room(fitted)
     # The bounds of effects are wide and give no scale, so only own parameters are scaled by theirs.
     own = np.array([n not in fitted.room for n in fitted.parameters], dtype=bool)
@@ -232,7 +232,7 @@ def _newton_step(matrix: Array, gradient: Array, free: NDArray[np.bool_]) -> Arr
     return np.asarray(-scale * np.linalg.solve(normal, g * scale))
 
 
-def _at_end(fitted: NormalEquations) -> NDArray[np.bool_]:
+def _at_hard_bound(fitted: NormalEquations) -> NDArray[np.bool_]:
     """Return which own parameters cannot go further (n_parameters,), whatever their tolerances allow.
 
     An example is a tolerance above half of the value, which would allow values below zero.

@@ -1,6 +1,6 @@
 """Counts the parameters of an effect that do not pay for themselves, so that the effect is not charged for them.
 
-Such parameters are, for example:
+This happens in several cases:
 
 - Ripple orders come from the residual; beside the right order, its neighbours are fitted, too.
 - A motion may show only one coordinate of a payload or a centre of mass, or one direction of a base tilt.
