@@ -31,7 +31,7 @@ def _neutral(trial: StartContext) -> Hypothesis:
 
 
 def _not_last_link(trial: StartContext) -> Hypothesis | None:
-    """Start at the neutral values; None for the last link, which carries no further axis."""
+    """Start at the neutral values; None for the last axis, whose link carries no further axis."""
     return _neutral(trial) if trial.index + 1 < trial.robot.n_axes else None
 
 
@@ -317,7 +317,7 @@ def _limit(trial: StartContext) -> Hypothesis:
 
 
 def _limit_of_targets(trial: StartContext) -> Hypothesis:
-    """Start at a torque limit where positions are compared: they lack the missing torque, and commands wind up."""
+    """Start at a torque limit where positions are compared: the motion lacks the torque, and commands wind up."""
     found = _limit_by(trial, 1.0)
     levels = np.quantile(np.abs(np.concatenate(trial.torque())), 1 - np.array(_BEYOND))
     return replace(found, starts=tuple({"limit_nm": float(level)} for level in levels))
@@ -352,7 +352,7 @@ def _point_mass(trial: StartContext) -> Hypothesis | None:
     """Start at the centre of mass of the last link that has one, and at points beside it.
 
     A mass at the centre may equal a wrong link mass, which the re-fit can absorb; beside it, it cannot. With a single
-    axis that lifts it, a payload equals a heavier link or another centre of mass; the diagnosis says so where it leads.
+    axis that lifts it, a payload equals a heavier link or another centre of mass; the diagnosis says so if it leads.
     A single axis that does not lift it shows only an inertia: then None.
     """
     joints = trial.robot.joints
