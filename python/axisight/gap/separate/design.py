@@ -135,9 +135,9 @@ def _seen(
 def _left(
     fitter: ClosedLoopFitter, model: FittedModel, free: Sequence[Hypothesis], n_axes: int
 ) -> tuple[Array, float]:
-    """Return the mean squares (n_runs, n_axes) that a model with the effects ``free`` leaves of each run.
+    """Return what a model with the effects ``free`` leaves of each run, as mean squares (n_runs, n_axes).
 
-    And the number of residuals of an axis.
+    The second value is the number of residuals of an axis.
     """
     # Sensitivities along other logs cannot be reused.
     start = replace(model, columns={})

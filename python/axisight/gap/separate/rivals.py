@@ -98,7 +98,7 @@ def rivals_of(found: SearchState, settings: Settings) -> Rivals | None:
     if not open_pairs:
         return None
     _, first, other = max(open_pairs, key=lambda x: x[0])
-    first = _beside_as_many(found, first, other)
+    first = _beside_same_causes(found, first, other)
     samples = found.layout.samples()
     return Rivals(
         (first.label, other.label),
@@ -109,7 +109,7 @@ def rivals_of(found: SearchState, settings: Settings) -> Rivals | None:
     )
 
 
-def _beside_as_many(
+def _beside_same_causes(
     found: SearchState, first: FittedHypothesis, other: FittedHypothesis
 ) -> FittedHypothesis:
     """Return the fit of a cause beside the same other causes as its rival, which may be older than the latest fit."""
