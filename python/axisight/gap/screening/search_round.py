@@ -52,8 +52,8 @@ _HALF_AS_MUCH = 0.5
 _REFINED = 2
 # Leaders refined at the same time, whatever the number of threads: their results decide which come next.
 _AT_ONCE = 2
-# The same numbers where the leader bends the own parameters: leaders that are refined, and the share of the leader's
-# score that a rival needs.
+# Where the leader bends the own parameters: leaders of an axis that are refined, and the share of the leader's score
+# that a rival needs.
 _REFINED_BENT = 4
 _FAR = 0.3
 # Steps on all data for a fit that converged on part of the data and only needs to be compared.
