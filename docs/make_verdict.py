@@ -42,7 +42,7 @@ for cause in verdict["causes"]:
 - Ratios are plain numbers, not per cent.
 - Numbers that do not exist, such as the gap of a simulation that broke off, are `null`.
 - `a.b` is the key `b` of the object `a`, `a[]` an element of the list `a`, `a.*` any entry of the object `a`.
-- Words such as *gap*, *floor* and *re-fit* are explained in the [glossary](style.md#glossary).
+- Words such as *gap*, *floor* and *re-fit* are explained in the [glossary](glossary.md).
 """
 
 TYPES = {
