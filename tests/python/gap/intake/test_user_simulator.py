@@ -127,7 +127,7 @@ def test_by_inverse_dynamics_the_gap_stays_that_of_the_model(
     assert found.mode == "inverse_dynamics"
     assert found.simulator is not None
     assert not found.simulator.taken_off
-    assert "the gap is that of the model" in " ".join(found.checks)
+    assert "The gap is that of the model" in " ".join(found.checks)
 
 
 # Of a rigid arm: friction that their simulator has on axis 1, and the machine on axes 1 and 3 [Nm].
@@ -171,7 +171,7 @@ def test_along_the_same_motion_inverse_dynamics_takes_it_off() -> None:
     # On the axis of their friction noise is left.
     gap = found.gap
     assert gap.before_per_axis[0] == pytest.approx(gap.floor_per_axis[0], rel=0.1)
-    assert "the gap is that of your simulator" in " ".join(found.checks)
+    assert "The gap is that of your simulator" in " ".join(found.checks)
     seen = Session("along", rigid, real[:2], real[2:], simulated=own)
     assert seen.held_gap() == pytest.approx(found.gap.before_per_axis)
 
