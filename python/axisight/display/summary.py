@@ -17,6 +17,8 @@ from axisight.display import html
 
 T = TypeVar("T", bound=type)
 
+MOST = 7
+"""Entries of a table, or of a list of results, that a repr shows."""
 # Lines of a result in a terminal; entries of an array that are shown one by one; words of a list.
 _MOST_LINES = 24
 _MOST_NUMBERS = 6

@@ -14,14 +14,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.display import html
-from axisight.display.summary import summarized
+from axisight.display.summary import MOST, summarized
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.gap.facts.axis_names import axis_label, verdict_word
 from axisight.gap.facts.compared_quantity import MOTION_HEAD, Compared, VelocityFrom, motion_words
 from axisight.gap.facts.experiment import Experiment
 from axisight.gap.facts.faults import Finding
-from axisight.gap.facts.shown import MOST, cause_in_words, cause_rows, percent
+from axisight.gap.facts.shown import cause_in_words, cause_rows, percent
 from axisight.gap.facts.trace import Trace
 from axisight.robot.axis_names import axis_number
 from axisight.storage import write_whole

@@ -7,9 +7,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from axisight.display import html
-
-MOST = 7
-"""Causes, values and axes that a repr shows."""
+from axisight.display.summary import MOST
 
 
 class Ranged(Protocol):
