@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import re
 import tomllib
 from pathlib import Path
@@ -56,3 +57,12 @@ def parse_json(text: str) -> Any:
 def _cut(said: str) -> str:
     """Cut the middle of what a parser says: where it was stands at the end."""
     return said if len(said) <= 200 else f"{said[:80]} ... {said[-60:]}"
+
+
+def finite(value: Any) -> Any:
+    """Return a document with None in place of numbers that JSON does not have."""
+    if isinstance(value, dict):
+        return {key: finite(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

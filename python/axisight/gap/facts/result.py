@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from axisight.display import html
 from axisight.display.summary import MOST, summarized
+from axisight.documents import finite
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.gap.facts.axis_names import axis_label, verdict_word
@@ -51,9 +51,8 @@ class Interval:
 class Pooled:
     """Torque error of the whole arm as identification papers give it: sqrt(sum e^2 / sum u^2) [1].
 
-    Sums over all samples, axes and validation logs; e is simulated minus measured torque, u the
-    measured torque itself, not about its mean. Axes with large torques weigh more than in `Gap`. ``before``,
-    ``refitted``, ``after`` and ``floor`` as in `Gap`.
+    Sums over all samples, axes and validation logs; e is simulated minus measured torque, u the measured torque
+    itself, not about its mean. Axes with large torques weigh more than in `Gap`. Stages as in `Gap`.
     """
 
     before: float
@@ -300,12 +299,11 @@ class DetectionLimit:
 class Overlay:
     """Measured and simulated torque on one axis of one validation log, as they are compared.
 
-    Arrays have shape (n,), thinned for plotting; torque in Nm (N on a prismatic axis). Measured and
-    simulated torque passed the same low-pass, of ``lowpass_hz``; None where neither is filtered. Where
-    positions are compared, it is the low-pass of their errors. ``counted`` (n,): weight of each error, of
-    mean square one along the log; zero at ends that do not count.
-    ``gap_before``, ``gap_after``: rms error of the whole log over ``torque_std_nm``, the standard deviation
-    of the measured torque [1]. Their rms over logs is ``before_per_axis`` and ``after_per_axis`` of `Gap`.
+    Arrays (n,) are thinned for plotting; torque in Nm (N on a prismatic axis). Both torques passed the same low-pass
+    of ``lowpass_hz``, or none. Where positions are compared, it is that of their errors. ``counted`` (n,): weight of
+    each error, of mean square one; zero at ends that do not count. ``gap_before``, ``gap_after``: rms error of the
+    whole log over ``torque_std_nm``, the standard deviation of the measured torque [1]; their rms over logs is that
+    of `Gap`.
     """
 
     log: str
@@ -323,12 +321,8 @@ class Overlay:
     @property
     def curves_nm(self) -> tuple[Array, Array, Array]:
         """Measured torque, and simulated before and after (n,); NaN where an error does not count."""
-        counts = self.counted > 0
-        return (
-            np.where(counts, self.measured_nm, np.nan),
-            np.where(counts, self.before_nm, np.nan),
-            np.where(counts, self.after_nm, np.nan),
-        )
+        hidden = np.where(self.counted > 0, 0.0, np.nan)
+        return self.measured_nm + hidden, self.before_nm + hidden, self.after_nm + hidden
 
     @property
     def errors_nm(self) -> tuple[Array, Array]:
@@ -511,8 +505,7 @@ class Diagnosis:
             "provenance": self.provenance,
             "trace": self.trace.to_dict(),
         }
-        finite: dict[str, Any] = _finite(out)
-        return finite
+        return dict(finite(out))
 
     def to_json(self) -> str:
         """Return the verdict as the text of its JSON file."""
@@ -521,15 +514,6 @@ class Diagnosis:
     def save_verdict(self, path: Path | str) -> None:
         """Write the verdict as JSON; the file appears whole or not at all."""
         write_whole(Path(path), self.to_json())
-
-
-def _finite(value: Any) -> Any:
-    """Return a document with None in place of numbers that JSON does not have."""
-    if isinstance(value, dict):
-        return {key: _finite(v) for key, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 _STAGES = ("before", "after", "floor", "refitted")

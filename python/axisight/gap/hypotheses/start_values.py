@@ -36,10 +36,7 @@ def _not_last_link(trial: StartContext) -> Hypothesis | None:
 
 
 def _law(**shares: float) -> Callable[[StartContext], Hypothesis]:
-    """Return a start at neutral values, with shape speeds of a friction law as ``shares`` of the axis's top speed.
-
-    A further start puts the friction behind the gear, if the law has that parameter.
-    """
+    """Return starts at neutral values, also behind the gear; shape speeds are ``shares`` of the axis's top speed."""
 
     def start(trial: StartContext) -> Hypothesis:
         top = max(float(np.abs(x[trial.index].speed_rad_s).max()) for x in trial.at.turning) or 1.0
@@ -78,10 +75,7 @@ _YIELDING = (3e-4, 1.5e-3, 6e-3)
 
 
 def _presliding(trial: StartContext) -> Hypothesis:
-    """Start with several pre-sliding distances and no break-away torque.
-
-    The relaxation time starts at one sample time, so that no step skips the break-away.
-    """
+    """Start with several pre-sliding distances, no break-away torque, and a relaxation time of one sample."""
     _, way, relaxation = BRISTLES
     travel = max(float(np.ptp(x[trial.index].angle_rad)) for x in trial.at.turning)
     starts = tuple({way: share * max(travel, 1e-3)} for share in _YIELDING)
@@ -117,7 +111,7 @@ def _waves(trial: StartContext) -> Hypothesis | None:
 def _orders(trial: StartContext, count: int) -> list[int]:
     """Return the strongest orders of the residual over the motor angle, given the response to the effect."""
     logs, responses = trial.turned()
-    # The angle of a prismatic axis may be in metres. A wave longer than the travel could have any shape.
+    # On a prismatic axis, a wave longer than the travel could have any shape.
     least = _SLIDE_TURNS if trial.robot.axis_is_prismatic[trial.index] else 0.0
     return strongest_orders(logs, responses, count=count, least_turns=least)
 
@@ -155,8 +149,7 @@ def _stiffness(trial: StartContext) -> float:
 def _deflection_rad(trial: StartContext, size: Callable[[Array], Any] = np.std) -> float:
     """Return the typical deflection of the gear [rad], under the torque of the log that moves it most.
 
-    ``size``: measure of a torque series, by default its standard deviation. At least the smallest deflection for start
-    values.
+    ``size``: measure of a torque series. At least the smallest deflection for start values.
     """
     return max(_bent_rad(trial, size), _LEAST_DEFLECTION_RAD)
 
@@ -188,12 +181,9 @@ _WIDER = 1.24
 def _play(trial: StartContext) -> Hypothesis:
     """Start at several half-widths of the backlash; at none on an axis with a small share of the error.
 
-    They begin at 4 % of the deflection under the torque's standard deviation. They end at 80 % of it, or on a rotating
-    axis at the largest half-width of industrial gears if that is more.
-
-    Some starts have teeth that rebound, some have teeth that a film of grease stops. The two move differently if
-    gravity lets the teeth fall from side to side. The damping in the gap is fitted later; see
-    `screening.restart_gear_law`.
+    From 4 % of the deflection under the torque's standard deviation to 80 % of it, or on a rotating axis to the
+    largest half-width of industrial gears. Some starts have teeth that rebound, some teeth that grease stops. The
+    damping in the gap is fitted later; see `screening.restart_gear_law`.
     """
     i, deflection = trial.index, _bent_rad(trial)
     begin = replace(_of_a_gear(trial), free=("half_width_rad",))
@@ -209,8 +199,7 @@ def _play(trial: StartContext) -> Hypothesis:
     return replace(begin, starts=(*rebounding, *stopped))
 
 
-# Stiffness of the cubic spring at the typical deflection, in linear stiffnesses. Near such a value, a linear step from
-# zero says little.
+# Stiffness of the cubic spring at the typical deflection, in linear stiffnesses: far enough from zero for a step.
 _HARDER = (1.0, 3.0, 10.0, 30.0)
 
 
@@ -287,10 +276,7 @@ def _soft(trial: StartContext) -> Hypothesis:
 
 
 def _coupled(trial: StartContext) -> Hypothesis | None:
-    """Start without coupling from one axis to the next; None if the next axis has a rigid gear.
-
-    Friction of the two axes is not free here. The coupling replaces several effects of single axes.
-    """
+    """Start without coupling from one axis to the next, its friction not free; None if the next gear is rigid."""
     assert isinstance(trial.place, tuple)  # guaranteed by the scope of the effect
     if trial.robot.axis_is_rigid[trial.place[1] - 1]:
         return None
