@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
 import re
 import shlex
 import tomllib
@@ -14,6 +15,7 @@ from typer.testing import CliRunner
 
 from axisight import Robot
 from axisight.cli import app
+from axisight.effects import title
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e-?\d+)?")
@@ -139,6 +141,31 @@ def test_diagnose(reader_of_demo: Reader, repository: Path) -> None:
     reader_of_demo.follow(repository / "docs" / "start_diagnose.md")
     assert reader_of_demo.shown == 4
     assert Path("demo/report.html").exists()
+
+
+# What a unit of the page is in the unit of the verdict.
+SCALES = {"Nm": 1.0, "ms": 1e-3, "%": 1e-2, "µrad": 1e-6}
+
+
+def test_detection_limits(reader_of_demo: Reader, repository: Path) -> None:
+    page = repository / "docs" / "detection_limits.md"
+    reader_of_demo.follow(page)
+    limits = {
+        (title(one["effect"]).lower(), one["axis"]): one["value"]
+        for one in json.loads(Path("again.json").read_text())["detection_limits"]
+    }
+    rows = re.findall(
+        r"^\| ([\w ]+), axis (\d) \| ([^|]+) \|", page.read_text("utf-8"), re.MULTILINE
+    )
+    assert len(rows) == 5
+    for effect, axis, shown in rows:
+        found = limits[effect.lower(), int(axis)]
+        if shown == "none":
+            assert found is None, effect
+        else:
+            value, unit = shown.split()
+            # The page has two digits.
+            assert found == pytest.approx(float(value) * SCALES[unit], rel=0.06), effect
 
 
 def test_simulate(reader: Reader, repository: Path) -> None:
