@@ -1,1 +1,1 @@
-"""The controller as algebra of references and measured positions, and what logs show of it."""
+"""The controller's law as algebra, and the differences from it that logs show."""

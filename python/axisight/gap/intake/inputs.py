@@ -119,7 +119,7 @@ def read_beside(
 
 
 def _loaded(load: Callable[..., Robot], source: Path | str, logs: Sequence[Log]) -> Robot:
-    """Return a robot; a model file without drive data gets the sample time of its logs."""
+    """Return a robot; a model file gets the sample time of its logs, unless its drive data state one."""
     if not is_model_file(source):
         return load(source)
     return load(source, sample_time_s=logs[0].sample_time_s)
