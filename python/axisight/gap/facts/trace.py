@@ -21,7 +21,7 @@ RULES: Mapping[str, str] = MappingProxyType(
         "cost": "A price for each number that was fitted (Schwarz 1978).",
         "own_parameters": "A price for moving the simulator's own parameters away from their stated values.",
         "formula_error": "Effects of this kind have one accepted formula, so small differences count.",
-        "better_fit": "It fits as well as the leader or better and predicts nearly as well, so both are equally likely.",
+        "better_fit": "It fits as well as the leader or better and predicts nearly as well: both are equally likely.",
         "plainer_law": "The logs do not show what this law adds to a plainer one, so it is less likely than that.",
         "look_alike": "It resembles the leader and is more common, so its prior odds are higher.",
         "play_of_gear": "The leader is a gear without stiffness in its middle, which is backlash.",
