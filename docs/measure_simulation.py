@@ -117,7 +117,7 @@ def events() -> None:
         crossing = half / 20 / contact_speed(robot, run, half)
         cases.append((f"backlash, b = {half:g} rad", effects, crossing))
     print("\n### Error of rk4 over the sub-steps per sample\n")
-    row("effect", "time over the width [us]", *SUBSTEPS)
+    row("effect", "crossing time [us]", *SUBSTEPS)
     row(*["---"] * (2 + len(SUBSTEPS)))
     exact = {}
     for name, effects, crossing in cases:
