@@ -4,7 +4,7 @@
 #   make setup   environment with the package built and installed
 #   make demo    diagnose a sample case and write a report into demo/
 #   make test    Rust tests, stub check, Python tests against the installed wheel
-#   make lint    formatting, clippy, ruff, mypy
+#   make lint    formatting, clippy, ruff, spelling, mypy
 #   make format  rewrite the sources in the format that lint asks for
 #   make docs    regenerate the generated pages and build the site into site/
 #   make gallery draw the effects and all plots anew for their pages
@@ -74,6 +74,7 @@ lint: $(STAMPS)/test-tools
 	$(CARGO) clippy --release --workspace --all-targets --locked -- -D warnings
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md docs python thesis crates examples
 	$(BIN)/mypy
 
 format: $(STAMPS)/test-tools
