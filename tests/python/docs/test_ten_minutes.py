@@ -84,8 +84,16 @@ def measured(run: int) -> tuple[Array, tuple[Array, Array, Array]]:
     )
 
 
+def shape(text: str) -> str:
+    """Return a screen without its figures and columns."""
+    return re.sub(r"\d[\d.]*", "#", " ".join(text.split()))
+
+
 def test_a_urdf_and_csv(
-    commands: dict[str, list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    commands: dict[str, list[str]],
+    repository: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     arm_urdf()
@@ -100,7 +108,10 @@ def test_a_urdf_and_csv(
     said(check)
     answer = said(diagnose)
     assert "explained: The simulator lacks Coulomb friction on axis 2" in answer
-    assert "compared: by inverse dynamics, below" in answer
+    assert "compared by inverse dynamics, below" in answer
+    page = (repository / "docs" / "ten_minutes.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"```text\n(.*?)```", page, re.DOTALL)
+    assert all(shape(part) in shape(answer) for part in shown.split("\n...\n"))
     assert re.search(r'<dynamics damping="0.5" friction="[12]\.', Path("new.urdf").read_text())
     assert Path("verdict.json").exists()
     assert Path("report.html").exists()
