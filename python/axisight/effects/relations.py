@@ -1,4 +1,4 @@
-"""How effects are akin, and by how much formulas of one differ: columns of the table of effects."""
+"""Relations between effects, and how much formulas of one effect differ: columns of the table of effects."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ FORMULA_KINDS: tuple[FormulaKind, ...] = get_args(FormulaKind)
 
 @dataclass(frozen=True)
 class Formula:
-    """What two formulas of an effect may differ by, whoever writes them.
+    """How much two accepted formulas of an effect differ.
 
-    ``error``: share of what it explains [1]; effects of one ``kind`` are held apart by that, ``held`` says
-    where: always, where one of the kind leaves hardly more than noise, or next to nothing. ``white``: what is
-    left of the right one is white. ``value_error``: standard deviation of a parameter, of its size [1];
-    ``of_each``: it is that for each number that is fitted.
+    - ``error``: as a share of what the effect explains [1]. Effects of one ``kind`` are compared with this error.
+    - ``held``: when it applies: always, or if an effect of the kind leaves little more than noise, or almost nothing.
+    - ``white``: whether the true effect leaves a white residual.
+    - ``value_error``: standard deviation of a parameter between formulas, relative to its size [1]; ``of_each``:
+      whether it grows with the number of fitted parameters.
     """
 
     kind: FormulaKind | None
@@ -29,20 +30,20 @@ class Formula:
 
     @property
     def exact(self) -> bool:
-        """Whether it is the same in all books."""
+        """Whether there is only one accepted formula."""
         return self.kind == "exact"
 
     def spread(self, free: int) -> float:
-        """Return the standard deviation of a parameter between formulas, of its size [1], with so many fitted."""
+        """Return the relative standard deviation of a parameter between formulas [1], with ``free`` fitted ones."""
         return self.value_error * free if self.of_each else self.value_error
 
 
 @dataclass(frozen=True)
 class Plainer:
-    """The ``law`` that an effect is where nothing of the parameters that it ``adds`` shows.
+    """The plainer ``law`` that an effect contains, and the parameters that it ``adds`` to that law.
 
-    It is ``likelier`` then, so many times. ``shown``: by the standard errors of these, or by how much larger
-    friction is at some speed than at high speed.
+    If the logs do not show the added parameters, the plainer law is ``likelier`` by this factor. ``shown``: how they
+    show, by their standard errors or by friction that rises at low speed.
     """
 
     law: str
@@ -52,16 +53,16 @@ class Plainer:
 
     @property
     def by_rise(self) -> bool:
-        """Whether it shows in how friction falls with speed, and not in standard errors."""
+        """Whether the addition shows in the rise of friction at low speed, not in standard errors."""
         return self.shown == "rise"
 
 
 @dataclass(frozen=True)
 class Resembles:
-    """An effect ``law``, of one parameter, that another one is like with the parameters ``shape``.
+    """An effect ``law`` with one parameter, which another effect equals at some values ``shape`` of its parameters.
 
-    That parameter is ``ratio`` times ``size``. Of machines that both describe as well, so many times as many
-    have that effect: this one is ``rarer``.
+    The parameter of ``law`` is ``ratio`` times ``size``. If both describe a machine equally well, the other effect is
+    ``rarer`` by this factor.
     """
 
     law: str
@@ -71,13 +72,13 @@ class Resembles:
     rarer: float
 
     def values(self, of_law: float) -> dict[str, float]:
-        """Return the parameters with which an effect is like the ``law`` with that parameter."""
+        """Return the parameters at which the effect equals ``law`` with this parameter."""
         return {self.size: of_law / self.ratio, **self.shape}
 
 
 @dataclass(frozen=True)
 class BegunFrom:
-    """A ``law`` that a fit may begin from as it ended, and which parameters take which values of it."""
+    """A ``law`` whose fit is a start for this effect, and which parameters take which of its values."""
 
     law: str
     takes: Mapping[str, str]
@@ -85,9 +86,10 @@ class BegunFrom:
 
 @dataclass(frozen=True)
 class Later:
-    """Numbers of a law that are looked for where its fit without them ended.
+    """Parameters of a law that are fitted in a second step, from where its fit without them ended.
 
-    Its ``amplitude`` begins at ``begin`` and is ``most`` at most; its ``shape`` as that of the effect ``as_of``.
+    The ``amplitude`` starts at ``begin``, with ``most`` as its upper bound. The ``shape`` starts like that of the
+    effect ``as_of``.
     """
 
     amplitude: str
@@ -99,10 +101,10 @@ class Later:
 
 @dataclass(frozen=True)
 class SpringChange:
-    """How a law makes a gear another spring.
+    """How a law changes the spring of a gear.
 
-    ``sums``: parameters whose sums are the changes of its stiffness [1], that of its middle first;
-    ``without_middle``: the law of a gear whose middle has lost it.
+    ``sums``: parameters whose sums are the relative changes of stiffness [1], in the middle first;
+    ``without_middle``: the law of a gear without stiffness in its middle.
     """
 
     sums: tuple[tuple[str, ...], ...]

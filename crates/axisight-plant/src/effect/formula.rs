@@ -1,40 +1,39 @@
-//! By how much formulas of one physical effect differ, whoever writes them.
+//! How much accepted formulas of one physical effect differ.
 
-/// Effects whose formulas are held against one another by as little as these differ.
+/// Kinds of effects that have one accepted formula each, so that small differences between them count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FormulaKind {
-    /// What is late: delays and lags.
+    /// Delays and lags.
     Lag,
     /// Laws of friction.
     Friction,
-    /// Weight, inertia and constant errors of torque, which are the same in all books.
+    /// Weight, inertia and constant errors of torque: one formula for all.
     Exact,
 }
 
-/// Where an effect is held to the error of its formula, instead of what formulas differ by in general.
+/// When the formula error of an effect applies, instead of the general one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Held {
-    /// Wherever it is tried.
+    /// Always.
     Always,
-    /// Where one of its kind leaves hardly more than noise: of a law that leaves more, it is not known what of it
-    /// the formula leaves.
+    /// If an effect of its kind leaves little more than noise.
     NearNoise,
-    /// Where one of its kind leaves next to nothing of what there is to explain.
+    /// If an effect of its kind leaves almost nothing of what there is to explain.
     NextToNothing,
 }
 
-/// What two formulas of an effect may differ by.
+/// How much two formulas of an effect may differ.
 ///
 /// Shares of the explained error that the right effect leaves, on simulated machines of other engines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Formula {
-    /// With which others it is held apart by that; None: with none.
+    /// The effects that are compared with this error; None: no others.
     pub kind: Option<FormulaKind>,
-    /// Share of what it explains by which two formulas of it may differ [1].
+    /// Share of the explained error by which two formulas may differ [1].
     pub error: f64,
-    /// Where that holds.
+    /// When that applies.
     pub held: Held,
-    /// Whether what is left of the right one is white: a difference counts for more then.
+    /// Whether the true effect leaves a white residual, so that a difference counts for more.
     pub white: bool,
     /// Standard deviation of a parameter between formulas, as a share of its size [1].
     ///

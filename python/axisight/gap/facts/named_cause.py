@@ -27,7 +27,7 @@ class NamedCause:
     ledger: tuple[Adjustment, ...] = ()
 
     def adjusted(self, rule: str, times: float) -> NamedCause:
-        """Return the same, so many times as probable by a rule of `axisight.gap.facts.trace.RULES`."""
+        """Return the cause with its probability multiplied, by a rule of `axisight.gap.facts.trace.RULES`."""
         entry = Adjustment(rule, self.label, log_odds(times))
         return replace(self, probability=times * self.probability, ledger=(*self.ledger, entry))
 

@@ -55,7 +55,7 @@ MOVES: Mapping[str, str] = MappingProxyType(
 
 
 def log_odds(times: float) -> float:
-    """Return the nats of what is so many times as probable; minus infinity for zero."""
+    """Return the nats of a factor on the odds; minus infinity for zero."""
     return math.log(times) if times > 0 else -math.inf
 
 
@@ -63,7 +63,7 @@ def log_odds(times: float) -> float:
 class Adjustment:
     """An entry of the ledger: a rule of `RULES` changed the log-weight of a hypothesis by ``nats``.
 
-    ``hypothesis``: its label, `NONE` or `UNKNOWN`. Minus infinity where it was taken out.
+    ``hypothesis``: its label, `NONE` or `UNKNOWN`. Minus infinity if the hypothesis was removed.
     """
 
     rule: str
@@ -73,7 +73,7 @@ class Adjustment:
 
 @dataclass(frozen=True)
 class ComparedHypothesis:
-    """A hypothesis as it stood on an axis: probability, share of the gap explained there, fitted numbers."""
+    """A hypothesis on an axis: its probability, the share of the gap that it explains there, its fitted numbers."""
 
     hypothesis: str
     probability: float
@@ -83,9 +83,9 @@ class ComparedHypothesis:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The hypotheses compared on an axis (from 1) in a round (from 1), beside ``causes`` taken in before.
+    """The hypotheses compared on an axis (from 1) in a round (from 1), beside the ``causes`` added before.
 
-    ``taken``: what was taken in there. ``ledger``: what each rule added, in order.
+    ``taken``: labels added in this round. ``ledger``: what each rule added to the log-weights, in order.
     """
 
     round: int
@@ -111,7 +111,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Work:
-    """What a search cost, whatever the machine.
+    """Amount of work of a search, independent of the computer.
 
     ``fits``, their accepted ``steps`` and the ``evaluations`` of the model in them; ``linearizations``:
     models evaluated with their sensitivities and not fitted.
@@ -137,5 +137,5 @@ class Trace:
     work: Work = Work()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the trace as the verdict's JSON has it; what was taken out has null for nats."""
+        """Return the trace as the verdict's JSON has it; removed hypotheses have null for nats."""
         return asdict(self)

@@ -1,1 +1,1 @@
-"""Fitted hypotheses held against one another: probabilities, intervals, what cannot be told apart."""
+"""Ranks fitted hypotheses: probabilities, intervals, and what cannot be told apart."""

@@ -1,1 +1,1 @@
-"""One round of the search: what every hypothesis promises, and fits of the promising ones."""
+"""One round of the search: screens every hypothesis by one linear step, and fits the promising ones."""

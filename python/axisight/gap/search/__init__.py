@@ -1,1 +1,1 @@
-"""Sets of causes: added, dropped, exchanged, merged until nothing more is worth a cause."""
+"""Searches for sets of causes: adds, drops, exchanges and merges causes until no axis has as much left as a cause."""

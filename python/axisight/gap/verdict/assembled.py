@@ -1,4 +1,4 @@
-"""The diagnosis put together from what was found and measured."""
+"""Puts the diagnosis together from the search and the measurements."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def assembled(
     places = _places(conclusion, (bands, regimes, settings.significance), settings)
     conclusion = conclusion.ranked_on(places[0].axis) if places else conclusion
     causes = _causes(conclusion, reductions)
-    # Where nothing was named, `after` is the simulator re-fitted alone.
+    # Without causes, `after` is the re-fitted simulator.
     fitted = found.model if reach.reductions else found.baseline
     refit = {k: _relative(robot, fitted, k) for k in fitted.robot_values}
     return Diagnosis(
@@ -140,7 +140,7 @@ def assembled(
 def _concluded(
     view: View, held_logs: Sequence[Log], seen: Validated, settings: Settings
 ) -> tuple[Conclusion, list[Interval]]:
-    """Return the conclusion as it holds on the validation logs, and what each cause reduces the gap by there."""
+    """Return the conclusion after validation, and by how much each cause reduces the gap there."""
     found, reach = seen.found, seen.reach
     names = [log.name for log in held_logs]
     share = bent_for(view.fitter, found)
@@ -175,9 +175,9 @@ def _places(
     maps: tuple[xr.Dataset, dict[str, xr.Dataset], float],
     settings: Settings,
 ) -> tuple[Where, ...]:
-    """Return where the gap lies: the gap before the causes, or what no effect explains of it; nowhere of *none*.
+    """Return where the gap lies: before the causes, or of *unknown* the part that no effect explains.
 
-    Of axes with that gap alone; one of them at least.
+    Only axes with such a gap are named, at least one; none for the verdict *none*.
     """
     if conclusion.verdict == "none":
         return ()

@@ -20,17 +20,16 @@ from axisight.gap.verdict.conclusion import Conclusion, advice_unknown
 
 Array = NDArray[np.float64]
 
-# A gap on one log and axis this much above the floor is seen by eye: a simulator without a fault,
-# re-fitted within its tolerances, leaves less, the errors of its formulas included.
+# Excess of the gap over the floor on one log and axis that counts as clear. A re-fitted simulator without a fault
+# leaves less, with its formula errors.
 _FACTOR = 1.3
 _SEEN = 0.03
-# Causes have to remove this share of the explainable squared gap of validation logs: less than half
-# of its amplitude is left then. One of two equal causes does not.
+# Share of the explainable squared gap on validation logs that causes must remove: less than half of the amplitude is
+# left then. One of two equal causes removes less.
 _ENOUGH = 0.8
-# Share of what stands above the floor that a cause of the size of noise has to remove.
+# Share of the excess over the floor that a cause of the size of noise must remove.
 _HALF = 0.5
-# By how much more of its squares than the floor says the steps of an encoder may leave: a motor that is
-# held between two of them swings as it likes.
+# Excess over the squared floor that encoder steps may leave: a motor that is held between two steps may oscillate.
 _BY_STEPS = 0.5
 # Noise cannot be this much larger than a gap that contains it.
 _ABSURD = 1.25
@@ -56,18 +55,17 @@ def carried_over(
     | *none* | a log stands above the floor | *unknown* |
     | anything | the estimated noise is larger than a gap that is seen | *unknown* |
 
-    ``own``: of causes whose axes are judged alone; they have to shrink the gap there.
-    ``bent``: share of the simulator's own parameters that the re-fit beside the causes took to the edge
-    of their tolerance, where that counts. ``removed``: share of what weighted residuals of the validation
-    logs have above noise that the causes remove; None where it is not known. ``stepped`` (n_axes,): where the
-    noise is that of an encoder's steps, of no axis by default.
+    - ``own``: causes that are judged on their own axes alone; they must shrink the gap there.
+    - ``bent``: share of the own parameters at the edge of their tolerance in the fit with the causes.
+    - ``removed``: share of the validation residual above noise that the causes remove; None if unknown.
+    - ``stepped`` (n_axes,): axes whose noise comes from encoder steps; none by default.
     """
     withdrawn = None
     labels = tuple(cause.label for cause in conclusion.causes)
     if gap.refitted > _SEEN and gap.floor > _ABSURD * gap.refitted:
         withdrawn = Withdrawal("noise", gap.before, gap.refitted, gap.floor)
     elif own is not None:
-        # Another motion may leave more of what nothing explains, and ask as much of the causes.
+        # Another motion may show more of what no effect explains, and as much of the causes.
         withdrawn = _no_fall_there(own, stages, names, conclusion)
     elif conclusion.causes and removed is not None and _of_no_size(conclusion, stages, removed):
         return _nothing(conclusion)
@@ -102,16 +100,13 @@ def _advice(withdrawn: Withdrawal) -> str:
 
 
 def _of_no_size(conclusion: Conclusion, stages: Stages, removed: float) -> bool:
-    """Whether causes explain what the simulator leaves anyway: no log stands above what passes for the floor.
-
-    Half of what there is of them on the validation logs would do to let them stand.
-    """
+    """Whether no validation log stands above the floor, and the causes remove less than half of the little excess."""
     small = all(a.excess <= _FACTOR**2 - 1.0 for a in conclusion.axes)
     return small and removed < _HALF and not np.any(above_floor(stages.refitted, stages) > 0)
 
 
 def _nothing(conclusion: Conclusion) -> Conclusion:
-    """Return *none* in the place of causes of no size; a check says which they were."""
+    """Return *none* in place of causes of the size of noise; a check names them."""
     names = listed([c.label for c in conclusion.causes])
     return replace(
         conclusion.without_causes("none"),
@@ -125,17 +120,16 @@ def _nothing(conclusion: Conclusion) -> Conclusion:
 
 
 def above_floor(left: Stage, stages: Stages) -> Array:
-    """Return by how much mean squares (n_logs, n_axes) exceed what passes for the floor [1].
+    """Return by how much mean squares (n_logs, n_axes) exceed the floor with its allowances [1].
 
-    Where it is positive, log and axis stand above the floor by more than the errors of formulas and
-    what is left open.
+    Positive where a log and axis stand above the floor by more than formula errors explain.
     """
     passing = _FACTOR**2 * _squares(stages.floor) + _SEEN**2
     return _squares(left) - passing - (0.0 if stages.open is None else _squares(stages.open))
 
 
 def open_check(stages: Stages) -> tuple[str, ...]:
-    """Say what stands above the noise because it cannot be known."""
+    """Return sentences about gaps above the noise that no data can explain."""
     if stages.open is None or stages.after.mean() <= _FACTOR**2 * stages.floor.mean() + _SEEN**2:
         return ()
     share = percent(float(np.sqrt(stages.open.mean())))
@@ -151,7 +145,7 @@ def _squares(stage: Stage) -> Array:
 
 
 def _floor(stages: Stages, stepped: NDArray[np.bool_] | None) -> float:
-    """Return the mean square of the floor, with what the steps of encoders make of what is left."""
+    """Return the mean square of the floor, raised for axes with coarse encoder steps."""
     noise, left = _squares(stages.floor), _squares(stages.after)
     more = np.clip(left - noise, 0.0, _BY_STEPS * noise)
     return float(np.mean(noise if stepped is None else noise + np.where(stepped, more, 0.0)))
@@ -169,7 +163,7 @@ def _no_fall(
     floor = _floor(stages, stepped)
     if gap.after**2 - gap.refitted**2 > settings.smallest_gain * gap.floor**2:
         return Withdrawal("refit", gap.refitted, gap.after, gap.floor, causes=causes)
-    # Where little stands above the noise, what is left of it is the noise of the floor.
+    # A small excess over the noise is within the error of the floor itself.
     if gap.after**2 - floor <= settings.smallest_gain * floor:
         return None
     explainable = gap.before**2 - floor

@@ -69,7 +69,7 @@ class Conclusion:
         return replace(self, checks=(*self.checks, *more))
 
     def with_causes_behind(self, more: Sequence[NamedCause]) -> Conclusion:
-        """Return the same with further causes behind its own: *explained* by them instead of *none*."""
+        """Return the conclusion with further causes after its own; *none* becomes *explained*."""
         place = {c.axis: len(self.causes) + k for k, c in enumerate(more)}
         axes = tuple(
             replace(
@@ -88,7 +88,7 @@ class Conclusion:
         return replace(out, verdict="explained", p_none=0.0, p_unknown=1.0 - sure)
 
     def without_causes(self, verdict: VerdictKind) -> Conclusion:
-        """Return the same with another verdict, for which its causes are candidates among others."""
+        """Return the conclusion with another verdict and without causes; these stay among the candidates."""
         return replace(
             self,
             verdict=verdict,
@@ -99,9 +99,9 @@ class Conclusion:
         )
 
     def ranked_on(self, axis: int) -> Conclusion:
-        """Return the same with the candidates of an axis (from 1): of *unknown*, where most is left to explain.
+        """Return an *unknown* conclusion with the candidates of an axis (from 1), the one with most left to explain.
 
-        Unchanged where the verdict is another, or no candidate improves that axis.
+        Unchanged for other verdicts, or if no candidate improves that axis.
         """
         standing = next((s for s in self.standings if s.axis == axis), None)
         if self.verdict != "unknown" or standing is None:
@@ -116,7 +116,7 @@ class Conclusion:
         )
 
     def rivals_of(self, label: str) -> tuple[str, ...]:
-        """Return what the data cannot tell from a cause, none of which is a cause itself."""
+        """Return the labels that the data cannot tell from a cause, without those that are causes themselves."""
         causes = {c.label for c in self.causes}
         rivals = [x for group in self.equivalent if label in group for x in group]
         return tuple(dict.fromkeys(x for x in rivals if x not in causes))
@@ -124,8 +124,7 @@ class Conclusion:
 
 # Candidates that a verdict lists.
 _ALTERNATIVES = 5
-# What the controller's own law shows could still be something else that looks alike: a limit of the
-# supply, not of the drive.
+# Probability of a cause that the controller's law shows. A limit of the supply, say, looks like one of the drive.
 _SHOWN = 0.99
 
 
@@ -205,33 +204,32 @@ def _standing(posterior: AxisPosterior, n_axes: int) -> AxisStanding:
     return AxisStanding(posterior.axis + 1, ranking, posterior.p_none, posterior.p_unknown)
 
 
-# What the right law leaves of what it explains, whoever writes its formula, and mean square above the
-# floor up to which more than that is noise and scatter of the simulator.
+# Share of the loss that the true law may leave, since formulas differ. More than that still counts as noise and scatter
+# of the simulator up to this mean square above the floor.
 _OF_A_LAW = 0.1
 _OF_NOISE = 4.0
 
 
 def _too_little(found: SearchState, explained: float, settings: Settings) -> bool:
-    """Whether causes explain too little, or leave so much of what is seen that they stand for another law."""
+    """Whether the causes explain too little, or leave so much in closed loop that another law must be the cause."""
     if explained < settings.explained_share:
         return True
     left = float(found.left().sum() / found.layout.samples().sum())
-    # By inverse dynamics the real thing has much that no effect explains.
+    # By inverse dynamics, a real machine has much that no effect explains.
     return not found.adds_up and explained < 1.0 - _OF_A_LAW and left > _OF_NOISE
 
 
 def named_shown(cause: AlgebraicCause) -> NamedCause:
-    """Return a cause that logs show by themselves as one of a verdict."""
+    """Return a cause that the logs show without a fit as a cause of the verdict."""
     info = effect_info(cause.name)
     units = {p.name: p.unit for p in info.parameters}
     return NamedCause(info.name, cause.axis, _SHOWN, dict(cause.values), units, info.family, _SHOWN)
 
 
 def _strongest(found: SearchState) -> AxisPosterior | None:
-    """Return how candidates stood where the first cause was taken in, by what other axes say, too.
+    """Return the posterior from which the first cause was added; without a cause that of the axis with most to explain.
 
-    Without a cause, where there was most to explain. What was taken in there and given up later is no
-    candidate any more, but beside what it gave way to where that left it open.
+    Causes that were added and removed later are left out, unless what replaced them left them open as rivals.
     """
     first = found.rounds[0]
     if not first.accepted:
@@ -249,7 +247,7 @@ def _strongest(found: SearchState) -> AxisPosterior | None:
 
 
 def _gave_way(cause: RankedHypothesis, axis: int, found: SearchState) -> AxisPosterior | None:
-    """Return how a cause stands beside what took its place later; None where that left nothing open."""
+    """Return the posterior in which a removed cause is a rival of its replacement; None if there is none."""
     label = cause.trial.label
     for winner, standing in found.accepted:
         beside = {f.effect.label for f in winner.trial.fitted.free}
@@ -260,7 +258,7 @@ def _gave_way(cause: RankedHypothesis, axis: int, found: SearchState) -> AxisPos
 
 
 def _open(winner: RankedHypothesis, standing: AxisPosterior, accepted: set[str]) -> tuple[str, ...]:
-    """Return the labels the data cannot tell from a cause; what is a cause itself is told apart."""
+    """Return the label of a cause and of the rivals that the data cannot tell from it; causes are no rivals."""
     rivals = [r.trial.label for r in standing.inseparable()]
     return (winner.trial.label, *(x for x in rivals if x not in accepted))
 
@@ -286,10 +284,8 @@ def _axes(
     return tuple(out)
 
 
-# Mean square above the floor up to which noise may have another colour: as much again. Of 119 machines of two
-# draws that were called none it was, held out, 0.4 at most where nothing lacked, and 1.5 to 2 on three that
-# lacked something. In the fit, not held out: of a log that alone tells a parameter the others predict what the
-# simulator does, and that is no effect.
+# Mean square of the fit above the floor up to which noise may have another colour than assumed. On 119 machines that
+# were called *none* it was at most 0.4 (held out) where nothing was missing, and 1.5 to 2 on three with a cause.
 OF_COLOUR = 1.0
 
 
@@ -304,7 +300,7 @@ def _most(found: SearchState, loss: Array) -> float:
 
 
 def _candidate_shown(cause: AlgebraicCause) -> Candidate:
-    # So many samples, each a trial of its own, stand where chance would put none.
+    # Each sample is a trial of its own.
     sure = float(np.sqrt(cause.samples))
     return Candidate(cause.name, cause.axis, _SHOWN, cause.explained, sure, "shown_by_the_logs")
 
@@ -339,8 +335,7 @@ def _named(
         if p.name.startswith("order_") and values.get(p.name):
             found[p.name] = Interval(values[p.name], values[p.name], values[p.name])
     units = {p.name: p.unit for p in info.parameters}
-    # Whether anything explains the axis is judged with all causes in; among candidates, what is a
-    # cause beside it is no rival.
+    # Other causes are no rivals. Whether anything explains the axis is judged with all causes together.
     rivals = [r for r in standing.ranked if r is ranked or r.trial.label not in accepted]
     whole = max(sum(r.probability for r in rivals), 1e-300)
     place = effect.place
