@@ -31,7 +31,6 @@ RULES: Mapping[str, str] = MappingProxyType(
         "composite": "A composite effect and its part count as one hypothesis: the part has the probability of both.",
         "simplest_first": "It explains nearly as much with fewer numbers, so it is named first.",
         "reported_torque": "The controller's gains, as the logs show them, imply this torque constant.",
-        "as_entered": "It was not fitted again beside later causes, so it keeps its odds against the leader.",
         "beside_causes": "Other causes of the axis are no rivals, so their probability does not count.",
         "either": "Another cause gives the same logs and is equally likely.",
         "twins": "Other effects give exactly the same logs and take a share of its probability.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import exp, prod
+from math import prod
 
 from axisight.effects import Effect, effect_info
 from axisight.gap.facts.trace import Adjustment, log_odds
@@ -62,8 +62,8 @@ def in_order(ranked: Sequence[RankedHypothesis], axis: int | None) -> tuple[Rank
 class AxisPosterior:
     """The candidates of one axis (from 0) with their probabilities, best first, and *none* and *unknown*.
 
-    ``ledger``: the entries that make up the log-weights, in order. Only `adjusted`, `without`, `with_untried`,
-    `exchanged` and `joined` change a probability, and each writes an entry.
+    ``ledger``: the entries that make up the log-weights, in order. Only `adjusted`, `without`, `exchanged`
+    and `joined` change a probability, and each writes an entry.
     """
 
     axis: int
@@ -104,35 +104,6 @@ class AxisPosterior:
             self.p_unknown / whole,
             (*self.ledger, *entries),
         )
-
-    def told_by_other_axes(self, entered: AxisPosterior) -> AxisPosterior:
-        """Return the posterior with the entries of ``entered`` that come from other axes applied again."""
-        said = [x for x in entered.ledger if x.rule in ("other_axes", "rival_leads")]
-        found = self
-        for x in said:
-            found = found.adjusted(x.rule, {x.hypothesis: exp(x.nats)})
-        return found
-
-    def with_untried(self, entered: AxisPosterior) -> AxisPosterior:
-        """Return the posterior with the rivals of ``entered`` that were not fitted again.
-
-        ``entered``: the posterior when the leader was added, beside fewer causes. Such rivals keep their odds against
-        the leader.
-        """
-        label = self.best.trial.label
-        before = next(r.probability for r in entered.ranked if r.trial.label == label)
-        known = {r.trial.label for r in self.ranked}
-        untried = [r for r in entered.ranked if r.trial.label not in known]
-        nats = sum(x.nats for x in self.ledger if x.hypothesis == label)
-        odds = [r.probability / max(before, TINY) for r in untried]
-        kept = [(x * self.best.probability, r) for x, r in zip(odds, untried, strict=True)]
-        entries = [
-            Adjustment("as_entered", r.trial.label, nats + log_odds(x))
-            for x, r in zip(odds, untried, strict=True)
-        ]
-        found = self._of([*((r.probability, r) for r in self.ranked), *kept], entries)
-        first, *rest = found.ranked
-        return replace(found, ranked=(first, *in_order(rest, None)))
 
     def exchanged(self, rule: str, one: RankedHypothesis) -> AxisPosterior:
         """Return the posterior with another candidate first; the two exchange their probabilities."""

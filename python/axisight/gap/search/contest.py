@@ -56,8 +56,6 @@ class Proposal:
       effect of the library explains the axis.
     - ``leeway``: share of the explained loss that a replacement may leave more, for its formula error.
     - ``as_entered``: a replacement keeps the probability that it had when the cause was added.
-    - ``entered``: the posterior when the cause was added, if ``instead`` holds all its open rivals. If the cause stays,
-      it gets the probability that it has beside all other causes.
     """
 
     axis: int
@@ -67,7 +65,6 @@ class Proposal:
     everywhere: bool = False
     leeway: float = 0.0
     as_entered: bool = False
-    entered: AxisPosterior | None = None
 
     @property
     def labels(self) -> frozenset[str]:
@@ -77,17 +74,14 @@ class Proposal:
 
 @dataclass(frozen=True)
 class Decision:
-    """The model that is taken, and the posterior led by the effect that is new in it; None if causes only went out.
-
-    If a cause stays and was judged again, the model is the present one and the posterior is the new one of that cause.
-    """
+    """The model that is taken, and the posterior led by the effect that is new in it; None if causes only went out."""
 
     model: FittedModel
     standing: AxisPosterior | None
 
 
 def decided(context: Context, proposal: Proposal) -> Decision | None:
-    """Return the decision on a proposal; None if the causes stay with the probability that they have."""
+    """Return the decision on a proposal; None if the causes stay."""
     fitter, model = context.fitter, context.state.model
     rest = [f for f in model.free if f.effect.label not in proposal.labels]
     if proposal.or_none == "needless":
@@ -108,7 +102,9 @@ def decided(context: Context, proposal: Proposal) -> Decision | None:
     if proposal.or_none == "doubtful" and (standing is None or _is_none(standing)):
         out = settled(fitter, rest, without)
         return None if isinstance(out, Diverged) else Decision(out, None)
-    return None if standing is None else contest.decided(standing, present)
+    if standing is None or standing.best.trial is present:
+        return None
+    return contest.decision(standing)
 
 
 def _without(context: Context, proposal: Proposal, rest: Sequence[Hypothesis]) -> Decision | None:
@@ -172,18 +168,6 @@ class _Contest:
             # An effect that leaves more cannot replace them.
             standing = standing.without(ranked.trial.label)
         return None
-
-    def decided(self, standing: AxisPosterior, present: FittedHypothesis) -> Decision | None:
-        """Return the decision for the leader. A cause that stays is judged again if all its open rivals were tried."""
-        entered = self.proposal.entered
-        if entered is not None:
-            standing = standing.told_by_other_axes(entered)
-        if standing.best.trial is not present:
-            return self.decision(standing)
-        if entered is None:
-            return None
-        judged = replace(standing, axis=entered.axis).with_untried(entered)
-        return Decision(self.state.model, judged)
 
     def decision(self, standing: AxisPosterior) -> Decision:
         """Return the decision for the leader."""

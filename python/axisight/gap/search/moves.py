@@ -67,18 +67,15 @@ def _made(move: Move, context: Context, tried: set[tuple[frozenset[str], frozens
             continue
         tried.add(key)
         decision = decided(context, proposal)
-        if decision is not None and _taken(move.name, context, proposal, decision):
+        if decision is not None:
+            _take(move.name, context, proposal, decision)
             return True
     return False
 
 
-def _taken(name: str, context: Context, proposal: Proposal, decision: Decision) -> bool:
-    """Put a decision into the state: the model and the new posterior. Return whether the set of causes changed."""
+def _take(name: str, context: Context, proposal: Proposal, decision: Decision) -> None:
+    """Put a decision into the state: the model and the new posterior."""
     state, standing = context.state, decision.standing
-    if decision.model is state.model:
-        if standing is not None:
-            state.judged_again(standing)
-        return False
     left, before = state.left(), {f.effect.label for f in state.model.free}
     if standing is not None and proposal.as_entered:
         standing = _as_entered(state, proposal, standing)
@@ -86,7 +83,6 @@ def _taken(name: str, context: Context, proposal: Proposal, decision: Decision) 
     # A remaining cause keeps its posterior, with all its rivals.
     if standing is not None and standing.best.trial.label not in before:
         state.rounds.append(Round((standing,), ((standing.best, standing),), left))
-    return True
 
 
 def _as_entered(state: SearchState, proposal: Proposal, standing: AxisPosterior) -> AxisPosterior:

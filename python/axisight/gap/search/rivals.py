@@ -23,14 +23,12 @@ def exchanged(context: Context) -> Iterator[Proposal]:
     crooked = bent(context.fitter, state.model) > 0
     for cause, standing in state.accepted:
         beside = {f.effect.label for f in cause.trial.fitted.free}
-        entered = None
         if not beside <= final:
             rivals = _nearly_as_good(cause, standing)
         elif mends := mending(cause, context.last):
             rivals = mends
         elif beside < final or crooked:
             rivals = open_rivals(cause, state.standings_of(cause))
-            entered = standing
         else:
             continue
         alone = len(state.model.free) == 1
@@ -41,7 +39,7 @@ def exchanged(context: Context) -> Iterator[Proposal]:
         )[:_RIVALS]
         if instead:
             mine = next(f for f in state.model.free if f.effect.label == cause.trial.label)
-            yield Proposal(standing.axis, (mine,), instead, entered=entered)
+            yield Proposal(standing.axis, (mine,), instead)
 
 
 def _nearly_as_good(cause: RankedHypothesis, entered: AxisPosterior) -> list[RankedHypothesis]:

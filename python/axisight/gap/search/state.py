@@ -71,12 +71,8 @@ class SearchState:
         self.steps.append(Step(move, before, after, self.model.total, model.total))
         self.model = model
 
-    def judged_again(self, standing: AxisPosterior) -> None:
-        """Record the posterior of a cause beside all other causes. It replaces that from when it was added."""
-        self.rounds.append(Round((standing,), ((standing.best, standing),), self.left()))
-
     def standings_of(self, cause: RankedHypothesis) -> tuple[AxisPosterior, ...]:
-        """Return the posteriors of the round in which a cause was added or judged again."""
+        """Return the posteriors of the round in which a cause was added."""
         return next(x.standings for x in self.rounds if any(r is cause for r, _ in x.accepted))
 
     def to_explain(self) -> Array:

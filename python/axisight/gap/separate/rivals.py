@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from axisight.gap.facts.experiment import ENOUGH, NAMED, Plan, SeparatingExperiment
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.fitted_model import FittedModel
-from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.likelihood import log_ratio
 from axisight.gap.search.state import SearchState
 from axisight.gap.separate.question import Seen, Turn
@@ -98,7 +97,6 @@ def rivals_of(found: SearchState, settings: Settings) -> Rivals | None:
     if not open_pairs:
         return None
     _, first, other = max(open_pairs, key=lambda x: x[0])
-    first = _beside_same_causes(found, first, other)
     samples = found.layout.samples()
     return Rivals(
         (first.label, other.label),
@@ -107,18 +105,3 @@ def rivals_of(found: SearchState, settings: Settings) -> Rivals | None:
         np.maximum(found.to_explain(), 0.0) / samples,
         settings.smallest_gain,
     )
-
-
-def _beside_same_causes(
-    found: SearchState, first: FittedHypothesis, other: FittedHypothesis
-) -> FittedHypothesis:
-    """Return the fit of a cause beside the same other causes as its rival, which may be older than the latest fit."""
-    for one in found.rounds:
-        for r, _ in one.accepted:
-            if r.trial.label == first.label and _others(r.trial) == _others(other):
-                return r.trial
-    return first
-
-
-def _others(one: FittedHypothesis) -> set[str]:
-    return {f.effect.label for f in one.fitted.free[:-1]}

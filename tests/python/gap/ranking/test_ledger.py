@@ -48,10 +48,6 @@ def test_likelihood_cost_and_rules_of_a_round_add_up():
     assert_adds_up(found)
 
 
-def led_by(found: AxisPosterior, label: str) -> AxisPosterior:
-    return found.led_by(next(r for r in found.ranked if r.trial.label == label))
-
-
 TIMES = st.floats(1e-3, 1e3)
 CHANGES = st.one_of(
     st.tuples(st.just("adjusted"), st.integers(0, 2), TIMES),
@@ -87,42 +83,6 @@ def test_other_axes_hold_a_rival_by_what_they_say():
     )
     assert_adds_up(here.with_axes_it_leads([elsewhere]))
     assert_adds_up(here.with_axes_rivals_lead([elsewhere]))
-
-
-def test_a_leader_judged_again_keeps_the_odds_against_rivals_that_were_not_fitted_again():
-    entered = led_by(three(), "coulomb_friction@1")
-    again = standing(
-        [
-            a_trial("coulomb_friction", 2, np.full(40, 1.05)),
-            a_trial("asymmetric_friction", 3, np.full(40, 1.3)),
-        ]
-    )
-    again = led_by(again, "coulomb_friction@1")
-    found = again.with_untried(entered)
-    assert {r.trial.label for r in found.ranked} == {r.trial.label for r in entered.ranked}
-    assert found.best.trial is again.best.trial
-    odds = [
-        next(r.probability for r in s.ranked if r.trial.label == "viscous_friction@2")
-        / next(r.probability for r in s.ranked if r.trial.label == "coulomb_friction@1")
-        for s in (found, entered)
-    ]
-    assert odds[0] == pytest.approx(odds[1])
-    assert_adds_up(found)
-
-
-def test_what_other_axes_said_holds_where_a_leader_is_judged_again():
-    elsewhere = standing(
-        [
-            a_trial("coulomb_friction", 2, np.full(40, 1.1)),
-            a_trial("asymmetric_friction", 3, np.full(40, 1.2)),
-        ]
-    )
-    entered = three().with_axes_it_leads([elsewhere])
-    again = three().told_by_other_axes(entered)
-    assert [r.probability for r in again.ranked] == pytest.approx(
-        [r.probability for r in entered.ranked]
-    )
-    assert_adds_up(again)
 
 
 def test_a_rival_that_does_nothing_elsewhere_is_out_of_question_and_still_told():

@@ -8,12 +8,10 @@ import pytest
 
 from axisight import Effect, Settings
 from axisight.fitting.divergence import Diverged
-from axisight.gap.facts.trace import Adjustment
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.judgement import set_likelier
-from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.search import contest
 from axisight.gap.search.contest import Alternative, Context, Decision, Proposal, decided
 from axisight.gap.search.state import SearchState
@@ -92,38 +90,6 @@ def test_a_cause_stays_where_its_rival_is_no_likelier_or_cannot_be_simulated(
     with_it: float | None,
 ):
     assert with_play({BOTH: 820.0, WITH_PLAY: with_it}) is None
-
-
-def entered(*shares: tuple[Hypothesis, float]) -> AxisPosterior:
-    """How a cause stood as it came in."""
-    ranked = [
-        RankedHypothesis(FittedHypothesis(f, None, np.zeros(1)), 0.9, 1.0, 9.0, p)  # type: ignore[arg-type]
-        for f, p in shares
-    ]
-    return AxisPosterior(0, tuple(ranked), 0.0, 0.0)
-
-
-def test_a_cause_that_stays_stands_as_it_does_beside_the_others():
-    """What was open when it came in is clear now; a rival that was not fitted again keeps its odds."""
-    here = context({BESIDE: 8000.0, BOTH: 820.0, WITH_PLAY: 1500.0}, SOFT, CUBIC)
-    waves = Hypothesis(Effect("transmission_error", 1, {"cosine_rad": 1e-5}), ("cosine_rad",))
-    before = entered((SOFT, 0.5), (PLAY, 0.4), (waves, 0.1))
-    found = decided(here, Proposal(0, (SOFT,), (Alternative(PLAY),), entered=before))
-    assert found is not None and found.standing is not None
-    assert found.model is here.state.model
-    stood = {r.trial.label: r.probability for r in found.standing.ranked}
-    assert found.standing.best.trial.label == SOFT.effect.label
-    assert stood["backlash@1"] < 1e-3
-    assert stood["transmission_error@1"] / stood[SOFT.effect.label] == pytest.approx(0.2)
-
-
-def test_what_another_axis_said_against_a_rival_counts_where_it_is_tried_again():
-    losses = {BOTH: 900.0, WITH_PLAY: 820.0}
-    before = entered((SOFT, 0.9), (PLAY, 0.1))
-    before = replace(before, ledger=(Adjustment("other_axes", "backlash@1", -20.0),))
-    here = context({BESIDE: 8000.0, **losses}, SOFT, CUBIC)
-    found = decided(here, Proposal(0, (SOFT,), (Alternative(PLAY),), entered=before))
-    assert found is not None and found.model is here.state.model
 
 
 def test_a_rival_that_contains_another_cause_is_no_alternative():

@@ -109,7 +109,7 @@ def taken(new: Hypothesis, *, as_entered: bool) -> StateStub:
     context = Context(None, state, Settings())  # type: ignore[arg-type]
     standing = AxisPosterior(0, (ranked(new, 1.0),), 0.0, 0.0)
     model = SimpleNamespace(free=[new])
-    moves._taken(
+    moves._take(
         "merge", context, Proposal(0, (PLAY,), as_entered=as_entered), Decision(model, standing)
     )  # type: ignore[arg-type]
     assert state.model is model
@@ -129,16 +129,3 @@ def test_what_takes_a_place_stands_as_the_contest_or_the_round_had_it(
 
 def test_one_of_the_causes_that_does_it_alone_stands_as_it_did():
     assert taken(OFFSET, as_entered=False).rounds == []
-
-
-def test_a_cause_that_stays_stands_as_it_was_judged_and_nothing_has_changed():
-    model = SimpleNamespace(free=[PLAY, OFFSET])
-    state = StateStub(model=model)
-    seen: list[AxisPosterior] = []
-    state.judged_again = seen.append
-    context = Context(None, state, Settings())  # type: ignore[arg-type]
-    standing = AxisPosterior(0, (ranked(PLAY, 0.7), ranked(DRAG, 0.3)), 0.0, 0.0)
-    decision = Decision(model, standing)  # type: ignore[arg-type]
-    assert not moves._taken("exchange", context, Proposal(0, (PLAY,)), decision)
-    assert seen == [standing]
-    assert state.model is model

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,11 +13,9 @@ from axisight.excitation import read_references
 from axisight.gap.facts.experiment import Experiment
 from axisight.gap.fit.data_blocks import layout_of
 from axisight.gap.fit.fitted_model import Hypothesis
-from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
-from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.separate.design import designed
 from axisight.gap.separate.question import Seen
-from axisight.gap.separate.rivals import Rivals, rivals_of
+from axisight.gap.separate.rivals import Rivals
 from axisight.gap.separate.waves import SECONDS, motions, seen_range, standard
 from axisight.gap.views.closed_loop import ClosedLoopView
 from axisight.logs import lowpass
@@ -200,37 +197,3 @@ def test_a_clear_case_asks_for_no_experiment(tmp_path: Path, logs: list[Log]):
     clear = [log_of(MACHINE, [], log.velocity_ref_rad_s, k) for k, log in enumerate(logs)]
     found = diagnose(robot=bare_axis(), estimation=clear[:2], validation=clear[2:], separate=True)
     assert (found.verdict, found.experiment, found.next_experiment) == ("none", None, None)
-
-
-def test_rivals_are_simulated_beside_the_same_others():
-    """A rival that was not fitted again stands beside fewer causes than the one that stays."""
-    free = [Hypothesis(e, ()) for e in (FRICTION, OFFSET, Effect("quadratic_drag", 1))]
-    friction, offset, drag = free
-
-    def tried(*effects: Hypothesis) -> FittedHypothesis:
-        return FittedHypothesis(effects[-1], SimpleNamespace(free=effects), np.zeros(1))  # type: ignore[arg-type]
-
-    def ranked(one: FittedHypothesis, p: float) -> RankedHypothesis:
-        return RankedHypothesis(one, 0.9, 1.0, 9.0, p)
-
-    then, again, other = tried(friction), tried(drag, friction), tried(offset)
-    standings = [
-        AxisPosterior(0, (ranked(one, 0.8), ranked(other, 0.2)), 0.0, 0.0) for one in (then, again)
-    ]
-    found = SearchStateStub(standings)
-    pair = rivals_of(found, Settings())  # type: ignore[arg-type]
-    assert pair is not None
-    assert pair.models == (then.fitted, other.fitted)
-
-
-class SearchStateStub:
-    """A search in which one cause came in, and was judged again."""
-
-    layout = SimpleNamespace(samples=lambda: np.ones(1))
-
-    def __init__(self, standings: list[AxisPosterior]) -> None:
-        self.rounds = [SimpleNamespace(accepted=[(s.best, s)]) for s in standings]
-        self.accepted = self.rounds[-1].accepted
-
-    def to_explain(self) -> np.ndarray:
-        return np.ones(1)
