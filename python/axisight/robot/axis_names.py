@@ -39,8 +39,12 @@ def axis_number(axis: object, joints: Sequence[str] | int, field: str = "axis") 
     listed = ", ".join(map(short, names[:_MOST])) + (", ..." if len(names) > _MOST else "")
     known = f" or a joint name ({listed})" if names else ""
     raise InputError(
-        f"{field}: expected 1 to {count}{known}, got {shown(axis)}{_meant(axis, names, count)}"
+        f"{field}: expected {_range(count)}{known}, got {shown(axis)}{_meant(axis, names, count)}"
     )
+
+
+def _range(count: int) -> str:
+    return "1" if count == 1 else f"1 to {count}"
 
 
 def _meant(axis: object, names: Sequence[str], count: int) -> str:

@@ -102,7 +102,7 @@ def test_limits_are_whole_in_80_columns():
     assert {"Asymmetric", "Load-dependent", "friction"} <= set(words)
     # What hides any size, and what the words mean, once.
     assert words.count("hidden") == words.count("never") == 1
-    assert words.count("hidden:") == words.count("never:") == 1
+    assert words.count("Hidden:") == words.count("Never:") == 1
     assert "axis 6" in text
     assert max(map(len, text.splitlines())) <= 80
 

@@ -271,11 +271,11 @@ def test_axis_fits_of_other_things_are_refused() -> None:
         (lambda: identified_axis(fit.parameters, robot, SOURCE), "fit: expected an AxisFit"),
         (
             lambda: identified_axis(fit, robot, SOURCE, axis=2),
-            r"axis: expected 1 to 1 or a joint name .*, got 2",
+            r"axis: expected 1 or a joint name .*, got 2",
         ),
         (
             lambda: identified_axis(fit, robot, SOURCE, axis=True),
-            r"axis: expected 1 to 1 or a joint name .*, got True",
+            r"axis: expected 1 or a joint name .*, got True",
         ),
         (lambda: identified_axis(fit, rigid, SOURCE), "axis: expected one with a gear spring"),
         (lambda: identified_axis(fit, robot, SOURCE, covariance="best"), "covariance: expected"),
