@@ -64,7 +64,7 @@ def test_single_values_far_off_are_named() -> None:
     assert not found.one_factor
     (text,) = found.findings
     assert text.startswith("the gear stiffness is 10 times that of the robot file")
-    with pytest.raises(InputError, match="axis: expected 1 to 1"):
+    with pytest.raises(InputError, match="axis: expected 1"):
         compare_with_robot(fit, ROBOT, axis=2)
     with pytest.raises(InputError, match="expected an AxisFit"):
         compare_with_robot({}, ROBOT)  # type: ignore[arg-type]

@@ -27,6 +27,7 @@ from axisight.cli.identify_common import (
 )
 from axisight.cli.panels import COMPARED, MODEL, OUTPUT, SEARCH
 from axisight.cli.screen import OUT
+from axisight.effects.stated import RIGID_BODY_TERMS
 from axisight.errors import IdentificationWarning, InputError, RobotError
 from axisight.fitting import robot_parameters
 from axisight.gap.prepare.used_part import Used
@@ -38,10 +39,8 @@ if TYPE_CHECKING:
     from axisight.robot_file import Provenance
 
 _FRICTION = ("viscous", "coulomb", "offset")
-_OFFSET = (
-    "torque_offset: the fit above is the torque that an axis needs; the effect in the robot file adds to "
-    "the command, so that it has the other sign"
-)
+# Terms of the fit that are torques an axis needs, and effects that add to the command.
+_TURNED = frozenset(effect for effect, _, sign in RIGID_BODY_TERMS.values() if sign < 0)
 _PARAMETERS = {"estimate": "least squares", "consistent": "bodies that can exist"}
 
 
@@ -214,8 +213,12 @@ def _write(
     try:
         values = found.identified(source)
         write_robot(machine, out, values, force=force)
-        if any(effect.name == "torque_offset" for effect in values.effects):
-            say(_OFFSET)
+        turned = sorted({effect.name for effect in values.effects} & _TURNED)
+        if turned:
+            say(
+                f"{', '.join(turned)}: the fit above is the torque that an axis needs; the effect in the robot file "
+                "adds to the command, so that it has the other sign"
+            )
     except RobotError as error:
         if found.consistent is not None:
             raise

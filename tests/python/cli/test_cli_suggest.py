@@ -68,7 +68,7 @@ def test_what_was_meant_is_said_once(folder, typed):
     assert done.exit_code in (1, 2)
     said = " ".join(done.output.split())
     assert WRONG[typed] in said, said
-    assert said.lower().count("Did you mean") <= 1
+    assert said.lower().count("did you mean") <= 1
 
 
 def test_of_several_commands_or_options_the_nearest_is_said(folder):
@@ -81,7 +81,7 @@ def test_of_several_commands_or_options_the_nearest_is_said(folder):
 
 def test_nothing_is_said_where_nothing_is_near(folder):
     for typed in ("columns show zzz", "check zzz.csv", "diagnose zzz"):
-        assert "Did you mean" not in CliRunner().invoke(app, typed.split()).output.lower()
+        assert "did you mean" not in CliRunner().invoke(app, typed.split()).output.lower()
 
 
 @pytest.mark.parametrize(

@@ -453,7 +453,7 @@ def test_a_notch_that_one_line_decides_has_no_standard_error(
 def test_initial_model_misuse(logs: list[Log]) -> None:
     with pytest.raises(InputError, match="broadband: expected at least one record"):
         initial_model(logs[0], [], gear_ratio=RATIO)
-    with pytest.raises(InputError, match="axis: expected 1 to 1, got 2"):
+    with pytest.raises(InputError, match="axis: expected 1, got 2"):
         initial_model(logs[0], logs[1:], gear_ratio=RATIO, axis=2)
     with pytest.raises(InputError, match="rigid: expected AxisData or a Log, got list"):
         initial_model([1.0], logs[1:], gear_ratio=RATIO)  # type: ignore[arg-type]

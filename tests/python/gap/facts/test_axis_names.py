@@ -104,7 +104,7 @@ def test_a_gap_within_tolerances_is_said():
         "(elbow_joint.mass +3 %), they leave 5.32 % there (noise alone: 5.77 %)."
     )
     page = render_report(replace(of("none"), gap=refitted_gap()))
-    assert "no larger than noise explains" in page
+    assert "The rest is at the floor." in page
     assert "re-fitted within their tolerances, remove it" in page
     assert "The measured difference is no larger" not in page
     assert "The measured difference is no larger" in render_report(of("none"))

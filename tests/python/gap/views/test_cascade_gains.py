@@ -192,7 +192,7 @@ def test_options_and_settings_are_refused_by_name(robot: Robot, tmp_path: Path) 
     assert _tolerances(["kv=0.5", "j3.ki=0.3"], robot) == {"kv": 0.5, "j3.ki": 0.3}
     with pytest.raises(InputError, match="kv, kp, ki, or one of a joint"):
         _tolerances(["kd=0.5"], robot)
-    with pytest.raises(InputError, match="--tolerance kv: expected between 0 and 1"):
+    with pytest.raises(InputError, match="--tolerance kv: expected a share between 0 and 1"):
         _tolerances(["kv=-0.5"], robot)
     with pytest.raises(InputError, match="kv, kp, or one of a joint"):
         _tolerances(["ki=0.5"], simulator(tmp_path, NOMINAL, P))
