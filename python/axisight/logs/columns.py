@@ -244,7 +244,7 @@ def _fault(item: ErrorDetails, missing: Sequence[tuple[int | str, ...]]) -> str:
         return f"expected a known key, got an unknown one{meant}"
     if kind == "literal_error":
         expected = str(item["ctx"]["expected"]).replace("'", "").replace(" or ", ", ")
-        return f"expected one of {expected}, got {got}{_as_unit(item['input'])}"
+        return f"expected one of {expected}, got {got}{as_unit(item['input'])}"
     message = short(item["msg"], 200)
     if kind == "value_error":
         return message.removeprefix("Value error, ")
@@ -283,7 +283,7 @@ _OTHER_UNITS = {
 }
 
 
-def _as_unit(given: object) -> str:
+def as_unit(given: object) -> str:
     """Return how a unit that is not known is written; empty for what is none."""
     if not isinstance(given, str) or given not in _OTHER_UNITS:
         return ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -13,14 +13,16 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
-from axisight.arguments import nearest, short
-from axisight.errors import LogError
-from axisight.logs.columns import ColumnMap
+from axisight.arguments import nearest, positive, short, shown, words
+from axisight.errors import InputError, LogError
+from axisight.logs.columns import ColumnMap, as_unit, describe_validation
 from axisight.logs.gather import gather_arrays
 from axisight.logs.log import Log
 from axisight.logs.map_files import AnyMap, load_column_map
 from axisight.logs.reading import log_of
+from axisight.logs.units import PRISMATIC_UNITS, REVOLUTE_UNITS
 from axisight.robot.axis_names import axis_number
 
 if TYPE_CHECKING:
@@ -56,6 +58,15 @@ _UNITS = {
 }
 # What a name without a unit means on an axis that turns, and on one that slides.
 _SLIDING = {"rad": "m", "rad/s": "m/s", "Nm": "N", "degC": "degC"}
+_TIME_UNITS = ("s", "ms", "us", "ns")
+# Units in names that no signal here has. They are recognized so that they can be refused.
+_FOREIGN = {
+    **{"knm": "kNm", "mnm": "mNm", "ncm": "Ncm", "kn": "kN", "ma": "mA", "mv": "mV", "v": "V"},
+    **{"mrad": "mrad", "mrad_s": "mrad/s", "counts": "counts", "counts_s": "counts/s"},
+    **{"degree": "degree", "degrees": "degrees", "radian": "radian", "radians": "radians"},
+    **{"cm": "cm", "um": "um"},
+}
+_MAP = "a column map (columns=...)"
 _TIMES = re.compile(r"(?:time|t|timestamp)(?:_(s|ms|us|ns))?", re.IGNORECASE)
 # Names that a message lists.
 _SHOWN = 12
@@ -105,22 +116,22 @@ def log_of_table(
         `velocity_1`, `joint_position_1`, `temperature_1`, and `time_s` (or the index). The number
         may be a joint name of the robot, and is left out where an array has all axes. A unit may
         follow: `position_deg_1`, `velocity_rpm_1`, `torque_nm_1`, `time_ms`. The attribute `units`
-        of a Dataset counts first; without any unit, signals are in rad, rad/s, Nm, degC and s.
+        of a Dataset counts first; without any unit, signals are in rad, rad/s, Nm, degC and s, on
+        sliding axes in m, m/s and N. A unit that the signal cannot have is refused.
     name : what the log is called.
     robot, currents : as in `read_log`.
 
     Raises LogError naming the column, what was expected and what came, with the nearest name.
 
     """
-    listed = _columns(table, name)
+    listed, attrs = _columns(table, name), _attributes(table, name)
     if columns is not None:
         given = load_column_map(columns) if isinstance(columns, Path | str) else columns
         arrays = {column.name: column.values for column in listed}
     else:
         found = _found(listed, name, robot)
-        given, arrays = _map_of(found, name, table, robot), found.arrays
+        given, arrays = _map_of(found, name, attrs.get("sample_time_s"), robot), found.arrays
     log = log_of(gather_arrays(arrays, name, given, robot), robot=robot, currents=currents)
-    attrs = getattr(table, "attrs", {})
     kept = {key: attrs[key] for key in ("excitation", "period_s") if key in attrs}
     return dataclasses.replace(log, name=name, source=Path(name), **kept)
 
@@ -139,7 +150,7 @@ def _columns(table: object, name: str) -> list[_Column]:
     if isinstance(table, xr.Dataset):
         found = list(_of_dataset(table))
     elif isinstance(table, Mapping):
-        found = [_Column(str(key), np.asarray(values)) for key, values in table.items()]
+        found = [_Column(str(key), _array(values, str(key), name)) for key, values in table.items()]
     else:
         frame = table if _is_frame(table) else cast(Any, table).to_pandas()
         found = list(_of_frame(frame))
@@ -150,10 +161,20 @@ def _columns(table: object, name: str) -> list[_Column]:
     return found
 
 
+def _array(values: object, column: str, name: str) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError) as error:  # lists of unequal lengths
+        raise LogError(
+            f"{name}: {short(column)}: expected an array (n,) or (n, axes), got {shown(values)}"
+        ) from error
+
+
 def _of_frame(frame: Any) -> Iterator[_Column]:
     index, names = frame.index, [_flat(name) for name in frame.columns]
     if index.dtype.kind in "mM":
-        yield _Column("time_s", np.asarray((index - index[0]) / np.timedelta64(1, "s"), float))
+        since = index - index[0] if len(index) else index - index
+        yield _Column("time_s", np.asarray(since / np.timedelta64(1, "s"), float))
     elif index.name is not None and str(index.name) not in names:
         yield _Column(str(index.name), np.asarray(index))
     for k, name in enumerate(names):
@@ -187,8 +208,15 @@ def _found(columns: Sequence[_Column], name: str, robot: Robot | None) -> _Found
     for column in columns:
         time = _TIMES.fullmatch(column.name)
         if time and column.values.ndim == 1:
-            unit = column.units if column.units in {"s", "ms", "us", "ns"} else time[1] or "s"
-            found.time = (column.name, unit.lower())
+            if found.time is not None:
+                raise LogError(
+                    f"{name}: time: expected one time column, got {found.time[0]} and {column.name}; "
+                    f"{_MAP} says which one is meant"
+                )
+            units = column.units.strip()
+            if units and units not in _TIME_UNITS:
+                raise LogError(f"{name}: {_wrong_unit(column.name, _TIME_UNITS, units)}")
+            found.time = (column.name, units or (time[1] or "s").lower())
             found.arrays[column.name] = column.values
             continue
         match = pattern.fullmatch(column.name)
@@ -196,13 +224,18 @@ def _found(columns: Sequence[_Column], name: str, robot: Robot | None) -> _Found
             found.others.append(column.name)
             continue
         field = _FIELDS[match["stem"].lower()]
-        for k, entry, values in _by_axis(column, match["axis"], joints):
-            unit = _unit(column, match["before"] or match["behind"], field, k, robot)
+        suffixes = [unit for unit in (match["before"], match["behind"]) if unit]
+        for k, entry, values, units in _by_axis(column, match["axis"], joints, name):
+            slides = _slides(robot, k)
+            try:
+                unit = _unit(entry, [units, *map(_written, suffixes)], field, slides)
+            except LogError as error:
+                raise LogError(f"{name}: {error}") from None
             if (field, k) in found.signals:
                 first = found.signals[field, k][0]
                 raise LogError(
                     f"{name}: {field} of axis {k + 1}: expected one column, got {first} and {entry}; "
-                    "a column map (columns=...) says which one is meant"
+                    f"{_MAP} says which one is meant"
                 )
             found.signals[field, k] = (entry, unit)
             found.arrays[entry] = values
@@ -212,8 +245,9 @@ def _found(columns: Sequence[_Column], name: str, robot: Robot | None) -> _Found
 def _pattern(joints: Sequence[str]) -> re.Pattern[str]:
     """Return the pattern of names: signal, unit, axis, with the unit before or behind the axis."""
     stems = "|".join(_FIELDS)
-    words = sorted({unit for units in _UNITS.values() for unit in units}, key=len, reverse=True)
-    units = "|".join(words)
+    known = {unit for units in (*_UNITS.values(), _FOREIGN) for unit in units}
+    known -= {joint.lower() for joint in joints}  # `torque_a` of a joint called a
+    units = "|".join(sorted(known, key=len, reverse=True))
     axes = "|".join([r"[1-9]\d{0,3}", *(re.escape(joint) for joint in joints)])
     return re.compile(
         rf"(?P<stem>{stems})(?:_(?P<before>{units}))?(?:_(?P<axis>{axes}))?(?:_(?P<behind>{units}))?",
@@ -222,46 +256,108 @@ def _pattern(joints: Sequence[str]) -> re.Pattern[str]:
 
 
 def _by_axis(
-    column: _Column, place: str | None, joints: Sequence[str]
-) -> Iterator[tuple[int, str, NDArray[Any]]]:
-    """Yield axis (from 0), name and values of each signal in a column."""
-    if column.values.ndim < 2:
-        axis = (
-            1 if place is None else int(place) if place.isdecimal() else axis_number(place, joints)
+    column: _Column, place: str | None, joints: Sequence[str], name: str
+) -> Iterator[tuple[int, str, NDArray[Any], str]]:
+    """Yield axis (from 0), name, values and units of each signal in a column; raises LogError for a wrong axis."""
+    values, units = column.values, column.units.strip()
+    if values.ndim > 2:
+        raise LogError(
+            f"{name}: {short(column.name)}: expected shape (n,) or (n, axes), got {values.shape}"
         )
-        yield axis - 1, column.name, column.values
+    if place is not None and values.ndim == 2:
+        if values.shape[1] != 1:
+            raise LogError(
+                f"{name}: {short(column.name)}: expected one signal, as the name has an axis, got "
+                f"shape {values.shape}"
+            )
+        values = values[:, 0]
+    if values.ndim < 2:
+        yield _axis_of(column.name, place, joints, name) - 1, column.name, values, units
         return
-    n = column.values.shape[1]
-    labels = column.axes or tuple(range(1, n + 1))
-    if joints and all(isinstance(label, str) for label in labels):
-        if not set(labels) <= set(joints):  # of all joints, elastic ones too
-            return
-        numbers = [axis_number(label, joints) for label in labels]
-    elif sorted(map(str, labels)) == sorted(map(str, range(1, n + 1))):
-        numbers = [int(label) for label in labels]
-    else:
-        numbers = list(range(1, n + 1))
+    n = values.shape[1]
+    numbers = _numbers(column, n, joints, name)
+    # A Dataset with axes of both kinds lists one unit per axis.
+    each = [unit.strip() for unit in units.split(",")]
+    each = each if len(each) == n else [units] * n
     for k, number in enumerate(numbers):
-        yield number - 1, f"{column.name}[{k}]", column.values[:, k]
+        yield number - 1, f"{column.name}[{k}]", values[:, k], each[k]
 
 
-def _unit(column: _Column, suffix: str | None, field: str, axis: int, robot: Robot | None) -> str:
-    """Return the unit of a signal: as an attribute says, its name, or the usual one."""
-    units = _UNITS[field]
-    said = column.units.split(", ")
-    beside = said[axis] if axis < len(said) > 1 else said[0]
-    if beside in units.values():
-        unit = beside
-    elif suffix and suffix.lower() in units:
-        unit = units[suffix.lower()]
-    else:
-        unit = next(iter(units.values()))
-    slides = robot is not None and axis < robot.n_axes and robot.axis_is_prismatic[axis]
-    return _SLIDING.get(unit, unit) if slides else unit
+def _axis_of(column: str, place: str | None, joints: Sequence[str], name: str) -> int:
+    """Return the axis (from 1) that a name says; the first one without. Raises LogError for no joint."""
+    if place is None:
+        return 1
+    if place.isdecimal():
+        return int(place)
+    try:
+        return axis_number(place, joints)
+    except InputError as error:  # a joint in another case
+        raise LogError(f"{name}: {short(column)}: {error}") from error
 
 
-def _map_of(found: _Found, name: str, table: object, robot: Robot | None) -> ColumnMap:
-    """Return the column map of what was found; raises LogError for what is missing."""
+def _numbers(column: _Column, n: int, joints: Sequence[str], name: str) -> list[int]:
+    """Return the axes (from 1) of an array's columns; none where the labels are other joints."""
+    usual = list(range(1, n + 1))
+    labels = [str(label) if isinstance(label, str) else label for label in column.axes or usual]
+    if not all(isinstance(label, str) for label in labels) or all(
+        label.isdecimal() for label in labels
+    ):
+        if [str(label).removesuffix(".0") for label in labels] != [str(k) for k in usual]:
+            raise LogError(
+                f"{name}: {short(column.name)}: axes: expected the labels 1 to {n} in order, or joint "
+                f"names, got {shown(labels)}"
+            )
+        return usual
+    if not joints:
+        return usual
+    if not set(labels) <= set(joints):  # of all joints, elastic ones too
+        return []
+    return [axis_number(label, joints) for label in labels]
+
+
+def _written(suffix: str) -> str:
+    """Return the unit that a suffix of a name stands for: `rad_s` is rad/s."""
+    meant = {**_FOREIGN, **{key: unit for units in _UNITS.values() for key, unit in units.items()}}
+    return meant[suffix.lower()]
+
+
+def _unit(column: str, given: Sequence[str], field: str, slides: bool | None) -> str:
+    """Return the unit of a signal: the first one given, or the usual one of the field.
+
+    ``slides``: whether the axis slides; None if the robot is unknown. Raises LogError for a unit of
+    another quantity or another kind of axis.
+    """
+    known = list(_UNITS[field].values())
+    if slides is not None:
+        wrong = REVOLUTE_UNITS if slides else PRISMATIC_UNITS
+        known = [unit for unit in known if unit not in wrong]
+    stated = [unit for unit in given if unit]
+    for unit in stated:
+        if unit not in known:
+            raise LogError(_wrong_unit(column, known, unit))
+    usual = next(iter(_UNITS[field].values()))
+    return stated[0] if stated else _SLIDING[usual] if slides else usual
+
+
+def _slides(robot: Robot | None, axis: int) -> bool | None:
+    """Return whether an axis (from 0) slides; None where no robot says it."""
+    known = robot is not None and axis < robot.n_axes
+    return bool(robot.axis_is_prismatic[axis]) if robot is not None and known else None
+
+
+def _wrong_unit(column: str, known: Sequence[str], unit: str) -> str:
+    """Return what is said of a unit that a column cannot have."""
+    return (
+        f"{short(column)}: unit: expected one of {', '.join(known)}, got {shown(unit)}; {_MAP} gives "
+        f"other units and scales{as_unit(unit)}"
+    )
+
+
+def _map_of(found: _Found, name: str, step: float | None, robot: Robot | None) -> ColumnMap:
+    """Return the column map of what was found; raises LogError for what is missing.
+
+    ``step``: sample time (s) for a table without time stamps.
+    """
     n = 1 + max((axis for _, axis in found.signals), default=0)
     n = n if robot is None else max(n, robot.n_axes)
     names = [*found.arrays, *found.others]
@@ -271,7 +367,6 @@ def _map_of(found: _Found, name: str, table: object, robot: Robot | None) -> Col
     known = {field for field, _ in found.signals}
     if not known & {"torque", "position_ref"}:
         raise LogError(f"{name}: {_missing('torque_cmd_1', 'Nm', found, names)}")
-    step = getattr(table, "attrs", {}).get("sample_time_s")
     if found.time is None and step is None:
         raise LogError(f"{name}: {_missing('time_s', 's', found, names)}")
     axes: list[dict[str, Any]] = [{} for _ in range(n)]
@@ -280,9 +375,27 @@ def _map_of(found: _Found, name: str, table: object, robot: Robot | None) -> Col
     given: dict[str, Any] = {"axis": axes}
     if found.time is not None:
         given["time"] = dict(zip(("name", "unit"), found.time, strict=True))
-    else:
-        given["sample_rate_hz"] = 1.0 / float(cast(float, step))
-    return ColumnMap.model_validate(given)
+    elif step is not None:
+        given["sample_rate_hz"] = 1.0 / step
+    try:
+        return ColumnMap.model_validate(given)
+    except ValidationError as error:
+        raise LogError(f"{name}: {describe_validation(error)}") from error
+
+
+def _attributes(table: object, name: str) -> dict[str, Any]:
+    """Return what the attributes of a table say of the log; raises LogError for a wrong value."""
+    attrs = getattr(table, "attrs", {})
+    checks: dict[str, Callable[[str, object], Any]] = {
+        "sample_time_s": positive,
+        "period_s": positive,
+        "excitation": words,
+    }
+    stated = {key: attrs[key] for key in checks if attrs.get(key) is not None}
+    try:
+        return {key: checks[key](f"attrs[{key!r}]", value) for key, value in stated.items()}
+    except InputError as error:
+        raise LogError(f"{name}: {error}") from error
 
 
 def _missing(wanted: str, unit: str, found: _Found, names: Sequence[str]) -> str:
