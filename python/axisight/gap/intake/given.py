@@ -13,6 +13,7 @@ from axisight.errors import CaseError, InputError
 from axisight.gap.facts.settings import Settings
 from axisight.logs import AnyMap, Case, Log, read_case, read_log
 from axisight.logs.sources import is_folder_log
+from axisight.logs.sources_bag import BAG_SUFFIXES
 from axisight.logs.tables import is_table, log_of_table
 from axisight.robot import Robot, load_robot
 from axisight.robot.presets import PRESETS
@@ -20,6 +21,7 @@ from axisight.robot.sources import MODEL_SUFFIXES
 
 # Suffixes of robot files; tables (.csv) may be logs.
 _ROBOTS = {*MODEL_SUFFIXES, ".toml"} - {".csv"}
+_LOG_SUFFIXES = {".parquet", ".csv", ".mat", ".h5", ".hdf5", ".npz", *BAG_SUFFIXES}
 _HOW = "diagnose(robot, logs, validation=...)"
 _ONE_LOG = (
     "validation: expected logs to hold out, or at least two logs, got one log; "
@@ -55,9 +57,19 @@ def given_inputs(
 
     Without validation logs, the last of several ``logs`` is held out. Raises InputError naming an argument that
     is missing, of another type, or given twice; CaseError if a role has no log; LogError for a log that cannot
-    be read.
+    be read. A path stands for a log if it has the suffix of one; otherwise for a case: its folder or its
+    ``case.toml``. ``columns`` holds for every log that is read, those of a case folder included.
     """
-    case, source, logs = _sorted_out(first, logs, robot, estimation)
+    if (
+        isinstance(first, Case)
+        and columns is not None
+        and not (_some(validation) or _some(simulated))
+    ):
+        raise InputError(
+            "columns: expected none beside a Case, whose logs are read already, got a column map; "
+            "read_case(folder, columns) takes one"
+        )
+    case, source, logs = _sorted_out(first, logs, robot, estimation, columns)
     if case is not None:
         source = case.robot_path if source is None else source
         read = _Reader(source, columns)
@@ -90,7 +102,11 @@ def check_options(settings: object) -> None:
 
 
 def _sorted_out(
-    first: object, logs: object, robot: object, estimation: object
+    first: object,
+    logs: object,
+    robot: object,
+    estimation: object,
+    columns: AnyMap | Path | str | None,
 ) -> tuple[Case | None, Robot | Path | str | None, object]:
     """Return the case, the simulator and the logs to split; None for each that was not given."""
     chosen = None if robot is None else _robot("robot", robot)
@@ -106,14 +122,15 @@ def _sorted_out(
             _no_logs(first)
         return None, _robot("robot", first), logs
     if isinstance(first, Case) or _is_path(first):
-        path = None if isinstance(first, Case) else Path(str(first))
-        if path is None or (path.is_dir() and not is_folder_log(path)):
-            if logs is not None or some:
-                raise InputError("logs: expected none beside a case, which has its own, got some")
-            return first if isinstance(first, Case) else _read(first), chosen, None
-        if chosen is not None:
+        path = usable_path("" if isinstance(first, Case) else str(first), CaseError)
+        if _is_path(first) and chosen is not None and _is_log(path):
             return None, chosen, [path]
-        return _read(_case_path(path)), None, None
+        if logs is not None or some:
+            raise InputError("logs: expected none beside a case, which has its own, got some")
+        if isinstance(first, Case):
+            return first, chosen, None
+        folder = _case_folder(path, alone=chosen is None)
+        return read_case(folder, columns, currents=True), chosen, None
     if isinstance(first, Log) or is_table(first) or isinstance(first, Iterable):
         if isinstance(logs, Robot) or chosen is None:
             raise InputError(f"robot: expected the robot first, {_HOW}, got {_kind(first)}")
@@ -125,17 +142,23 @@ def _sorted_out(
     )
 
 
-def _case_path(path: Path) -> Path:
-    """Return the path of a case; raise InputError for a robot without logs, or a log without a robot."""
-    if str(path) in PRESETS or path.suffix.lower() in _ROBOTS:
+def _is_log(path: Path) -> bool:
+    """Whether a path stands for a log: by its suffix, or as the folder of a recording."""
+    return is_folder_log(path) or (path.suffix.lower() in _LOG_SUFFIXES and not path.is_dir())
+
+
+def _case_folder(path: Path, *, alone: bool) -> Path:
+    """Return the folder of a case.
+
+    ``alone``: no robot was given; raises InputError for a robot without logs, or a log without a robot.
+    """
+    if path.name == "case.toml" and not path.is_dir():
+        return path.parent
+    if alone and not path.is_dir() and (str(path) in PRESETS or path.suffix.lower() in _ROBOTS):
         _no_logs(path)
-    if path.is_file() or is_folder_log(path):
+    if alone and _is_log(path):
         raise InputError(f"robot: expected a robot beside the log {path}, {_HOW}, got none")
     return path
-
-
-def _read(path: object) -> Case:
-    return read_case(usable_path(str(path), CaseError), currents=True)
 
 
 def _no_logs(robot: object) -> None:

@@ -1,5 +1,6 @@
 """Every way to hand a robot and its logs to `diagnose`."""
 
+import shutil
 from functools import cache
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from axisight import Effect, Log, Settings, diagnose, read_case
 from axisight.errors import CaseError, InputError, LogError
 from axisight.gap.intake.given import Given, given_inputs
+from axisight.logs import parse_column_map
 from gap_data import bare_axis, bare_case, logs_of, scattered
 
 ROBOT = bare_axis()
@@ -135,3 +137,38 @@ def test_files_that_are_not_there_and_logs_beside_a_case(folder):
         given(read_case(folder), logs())
     with pytest.raises(InputError, match="robot: expected a robot beside the log"):
         given(folder / FIRST)
+
+
+def test_a_case_stands_for_its_folder_and_only_a_suffix_makes_a_log(folder):
+    for path in (folder / "case.toml", str(folder / "case.toml")):
+        assert [log.name for log in given(path).validation] == ["last"]
+        assert given(path, robot=ROBOT).source is ROBOT
+    for robot in (None, ROBOT):
+        for path in ("nope", folder / "nope" / "case.toml", folder / "notes.txt"):
+            with pytest.raises(CaseError, match=r"case\.toml"):
+                given(path, robot=robot)
+        with pytest.raises(CaseError, match="shorter path"):
+            given("a" * 300, robot=robot)
+    with pytest.raises(InputError, match=r"robot: expected a robot beside the log nothing\.csv"):
+        given("nothing.csv")
+    with pytest.raises(LogError, match=r"nothing\.parquet: expected a file, got nothing"):
+        given("nothing.parquet", robot=ROBOT)
+
+
+def test_a_column_map_holds_for_the_logs_of_a_case(tmp_path, folder):
+    shutil.copytree(folder, tmp_path / "case")
+    names = {"position_1": "q", "torque_cmd_1": "u"}
+    for path in (FIRST, MOVES, LAST):
+        table = pd.read_parquet(tmp_path / "case" / path)
+        table.rename(columns=names).to_parquet(tmp_path / "case" / path)
+    columns = parse_column_map(
+        "[time]\nname = 'time_s'\n[[axis]]\nposition = { name = 'q', unit = 'rad' }\n"
+        "torque = { name = 'u', unit = 'Nm' }\n"
+    )
+    found = given_inputs(tmp_path / "case", None, None, (), (), (), columns)
+    np.testing.assert_allclose(found.validation[0].torque_nm, logs()[2].torque_nm)
+    case = read_case(tmp_path / "case", columns)
+    with pytest.raises(InputError, match="columns: expected none beside a Case"):
+        given_inputs(case, None, None, (), (), (), columns)
+    more = given_inputs(case, None, None, (), tmp_path / "case" / MOVES, (), columns)
+    assert [log.name for log in more.validation] == ["last", "moves"]
