@@ -5,6 +5,7 @@ import importlib
 import inspect
 import re
 from html.parser import HTMLParser
+from pathlib import PurePosixPath
 
 import numpy as np
 import pytest
@@ -152,6 +153,11 @@ def test_robots_effects_and_logs_are_short():
         (("a", "b", "c", "d", "e", "f"), "names", "a, b, c, d, and 2 more"),
         (np.array([]), "lines", "none"),
         ({"a": 1 / 3}, "values", "a: 0.3333"),
+        (2e-6, "compliance_rad_nm", "2e-06 rad/Nm"),
+        (2.5, "static_moment_kg_m", "2.5 kg m"),
+        (2.5, "compliance_rad_nm_std", "2.5 rad/Nm"),
+        (PurePosixPath("logs/first.csv"), "source", "logs/first.csv"),
+        ((PurePosixPath("a/b"), "c"), "files", "a/b, c"),
     ],
 )
 def test_values_are_shortened_with_their_unit(value, name, text):

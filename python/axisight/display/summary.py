@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from itertools import islice
+from pathlib import PurePath
 from typing import Any, TypeVar
 
 import numpy as np
@@ -30,10 +31,12 @@ _UNITS = (
     ("kg_m2", "kg m^2"),
     ("nm_s_rad", "Nm s/rad"),
     ("nm_rad", "Nm/rad"),
+    ("rad_nm", "rad/Nm"),
     ("rad_s2", "rad/s^2"),
     ("m_s2", "m/s^2"),
     ("rad_s", "rad/s"),
     ("nm_a", "Nm/A"),
+    ("kg_m", "kg m"),
     ("m_s", "m/s"),
     ("nm", "Nm"),
     ("rad", "rad"),
@@ -167,8 +170,8 @@ def _worded(value: object) -> str:  # noqa: PLR0911 one line a kind
         return "yes" if value else "no"
     if isinstance(value, int | np.integer | float | np.floating | complex | np.complexfloating):
         return _number(value)
-    if isinstance(value, str):
-        return _cut(value)
+    if isinstance(value, str | PurePath):
+        return _cut(str(value))
     if isinstance(value, np.ndarray):
         return _array(value)
     # Tables of xarray and pandas, which are not loaded for this.
@@ -187,7 +190,7 @@ def _worded(value: object) -> str:  # noqa: PLR0911 one line a kind
 
 def _item(value: object) -> str:
     """Return what is said of a value inside another one: of a result its kind, or what it says in words."""
-    if isinstance(value, str | bool | int | float | complex | np.generic | np.ndarray):
+    if isinstance(value, str | PurePath | bool | int | float | complex | np.generic | np.ndarray):
         return _worded(value)
     if isinstance(value, tuple | list | Mapping):
         return f"({_worded(value)})" if value else "none"
