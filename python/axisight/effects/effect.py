@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from axisight.arguments import did_you_mean, short, shown
 from axisight.effects.table import EffectInfo, effect_info
@@ -28,7 +30,7 @@ class Effect:
         place, and so does every call that has a robot. Not to be given.
 
     Effects are equal if they have the same name, place and values. Raises InputError for an unknown
-    effect or parameter, and for a place that the effect cannot have.
+    effect or parameter, for a value that is no number, and for a place that the effect cannot have.
 
     """
 
@@ -43,7 +45,7 @@ class Effect:
         name: str,
         axis: int | str | None = None,
         parameters: Mapping[str, float] | None = None,
-        axes: Sequence[int | str] | None = None,
+        axes: Sequence[int | str] | NDArray[np.integer[Any]] | None = None,
         joints: Sequence[int | str] = (),
     ) -> None:
         """Refuse unknown names and impossible axes early."""
@@ -151,9 +153,13 @@ def _axis(effect: str, axis: object, field: str = "axis") -> int:
     return int(axis)
 
 
-def _two_axes(info: EffectInfo, axes: Sequence[int | str]) -> tuple[int | str, int | str]:
+def _two_axes(
+    info: EffectInfo, axes: Sequence[int | str] | NDArray[np.integer[Any]]
+) -> tuple[int | str, int | str]:
     """Return two different axes, as numbers or joint names."""
     expected = "two different axes from 1" if info.scope == "axes" else "none"
+    if isinstance(axes, np.ndarray):
+        axes = axes.tolist()
     two = isinstance(axes, Sequence) and not isinstance(axes, str) and len(axes) == 2
     if info.scope != "axes" or not two or axes[0] == axes[1]:
         raise InputError(f"effect {info.name!r}: axes: expected {expected}, got {shown(axes)}")
@@ -164,7 +170,7 @@ def _two_axes(info: EffectInfo, axes: Sequence[int | str]) -> tuple[int | str, i
 
 
 def _check_parameters(info: EffectInfo, parameters: object) -> None:
-    """Raise InputError for what is no mapping, and for a parameter that the effect does not have."""
+    """Raise InputError for what is no mapping, an unknown parameter, and a value that is no number."""
     if parameters is None:
         return
     known = [p.name for p in info.parameters]
@@ -172,11 +178,15 @@ def _check_parameters(info: EffectInfo, parameters: object) -> None:
         example = f"{{{known[0]!r}: ...}}" if known else "none"
         got = shown(parameters)
         raise InputError(f"effect {info.name!r}: parameters: expected {example}, got {got}")
-    for name in parameters:
+    for name, value in parameters.items():
         if name not in known:
             meant = did_you_mean(name, known)
             raise InputError(
                 f"effect {info.name!r}: parameter {name!r}: expected {', '.join(known)}{meant}"
+            )
+        if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+            raise InputError(
+                f"effect {info.name!r}: parameter {name!r}: expected a number, got {shown(value)}"
             )
 
 

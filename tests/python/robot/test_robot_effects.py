@@ -479,6 +479,25 @@ def test_places_that_no_coupling_has_are_refused(coupling: str, place, words: st
         Effect("backlash", axes=(1, 2))
 
 
+def test_axes_may_be_an_array(coupling: str) -> None:
+    effect = Effect(coupling, axes=np.array([1, 2]))
+    assert effect == Effect(coupling, axes=(1, 2)) and effect.axes == (1, 2)
+    assert repr(effect) == "Effect('coupling', axes=(1, 2))"
+    for wrong in (np.array([1.0, 2.0]), np.array([[1, 2]]), np.array(1), np.array([1, 1])):
+        with pytest.raises(InputError, match="axes: expected two different axes from 1, got"):
+            Effect(coupling, axes=wrong)
+
+
+@pytest.mark.parametrize("value", ["0.4", None, True, [0.4], 1j, np.array([0.4])])
+def test_values_that_are_no_numbers_are_refused(value: object) -> None:
+    with pytest.raises(
+        InputError, match="'coulomb_friction': parameter 'coulomb_nm': expected a n"
+    ):
+        Effect("coulomb_friction", 1, {"coulomb_nm": value})
+    for number in (1, np.float32(0.5), np.int64(2)):
+        assert repr(Effect("coulomb_friction", 1, {"coulomb_nm": number}))
+
+
 def test_effects_are_equal_by_what_they_do() -> None:
     short = Effect("coulomb_friction", 2, {"coulomb_nm": 0.4})
     neutral = next(
