@@ -96,6 +96,7 @@ def assembled(
                 own=tuple(robot.effects),
                 refit=refit,
                 joints=robot.axis_names,
+                mode=view.mode,
             )
         ),
         gap=gap,

@@ -17,6 +17,7 @@ from axisight.gap.facts.result import (
     Cause,
     Gap,
     Interval,
+    Mode,
     Remainder,
     VerdictKind,
     Where,
@@ -38,6 +39,7 @@ from axisight.gap.verdict.cause_words import (
 __all__ = ["Facts", "clear_changes", "headline", "in_order", "named", "within_tolerances"]
 
 _Groups = tuple[tuple[str, ...], ...]
+_UNFELT = "A torque predicted from the measured motion does not feel this."
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class Facts:
     ``open``: groups of labels that the data cannot tell apart, the cause first; ``twins``: groups that give
     the same logs; ``withdrawn``: how the validation logs contradict the estimation logs. ``where`` the gap
     lies and the ``remainder`` with the causes in. ``own``: effects of the simulator; ``refit``: relative change
-    of its own parameters [1]; ``joints``: names of its axes.
+    of its own parameters [1]; ``joints``: names of its axes. ``mode``: how torques were predicted.
     """
 
     verdict: VerdictKind
@@ -63,6 +65,7 @@ class Facts:
     own: tuple[Effect, ...] = ()
     refit: Mapping[str, Interval] = field(default_factory=dict)
     joints: Sequence[str] = ()
+    mode: Mode = "closed_loop"
 
     @property
     def n_axes(self) -> int:
@@ -165,14 +168,12 @@ def _effect(facts: Facts) -> str:
     gap, causes = facts.gap, facts.causes
     figures = f"of the {_torque(facts)}"
     what = gap_of(gap.compared)
-    felt = [c for c in causes if not c.gap_reduction.low == c.gap_reduction.high == 0.0]
+    felt = _felt(facts)
     steps = [c for c in felt if effect_info(c.effect).unrepeatable]
+    others = [c for c in felt if c not in steps]
     if not felt:
-        return (
-            "A torque predicted from the measured motion does not feel this. The gap is "
-            f"{percent(gap.refitted)} {figures} (noise alone: {percent(gap.floor)})."
-        )
-    if len(steps) == len(causes):
+        return f"{_UNFELT} The gap is {percent(gap.refitted)} {figures} (noise alone: {percent(gap.floor)})."
+    if not others:
         return (
             f"The steps of the encoders set the floor: the {what} is {percent(gap.refitted)} {figures} "
             f"(noise and steps: {percent(gap.floor)})."
@@ -183,9 +184,20 @@ def _effect(facts: Facts) -> str:
     if facts.open:
         one = f"the first of {'each' if len(facts.open) > 1 else 'them'}"
         return f"With {one} the {what} on validation logs goes {from_to}."
-    others = [c for c in felt if c not in steps]
     act = deed(others, facts.own, causes, facts.n_axes)
     return f"{act} {cuts} the {what} on validation logs {from_to}."
+
+
+def _felt(facts: Facts) -> list[Cause]:
+    """Return the causes that the gap feels: by inverse dynamics those of the controller make none of it."""
+    if facts.mode != "inverse_dynamics":
+        return list(facts.causes)
+    return [
+        c
+        for c in facts.causes
+        if effect_info(c.effect).acts != "controller"
+        or not c.gap_reduction.low == c.gap_reduction.high == 0.0
+    ]
 
 
 def _twins(facts: Facts) -> str:
