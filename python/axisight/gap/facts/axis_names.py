@@ -9,8 +9,11 @@ from axisight.effects import article, effect_info, noun, phrase
 
 # Names that say no more than the number of the axis.
 _PLAIN = re.compile(r"(?:axis|joint|j|a|q)?[ _-]?0*(\d+)", re.IGNORECASE)
-# "axis 2", "axes 2 and 3"; more than so many are not told by name, a table has them.
-_MENTION = re.compile(r"\b([Aa]xis|[Aa]xes) (\d+(?:(?:, | and )\d+)*)")
+# "axis 2", "axes 2 and 3", but not the 4 of "axes 2 and 3 and 4 more effects". More than so many are not told by
+# name, a table has them.
+_MENTION = re.compile(
+    r"\b(?:([Aa]xis) (\d+)|([Aa]xes) (\d+(?:(?:, | and )\d+\b(?! (?:more|others?)\b))*))"
+)
 _MOST = 3
 # Share by which a gap may lie above its floor and be noise all the same: both are measured.
 _NOISE = 0.1
@@ -62,9 +65,10 @@ def with_joints(text: str, names: Sequence[str]) -> str:
         return axis_label(int(number[0]), names)
 
     def mention(found: re.Match[str]) -> str:
-        if len(re.findall(r"\d+", found[2])) > _MOST:
+        word, numbers = found[1] or found[3], found[2] or found[4]
+        if len(re.findall(r"\d+", numbers)) > _MOST:
             return found[0]
-        return f"{found[1]} {re.sub(r'[0-9]+', label, found[2])}"
+        return f"{word} {re.sub(r'[0-9]+', label, numbers)}"
 
     return _MENTION.sub(mention, text)
 

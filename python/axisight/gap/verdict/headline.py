@@ -39,6 +39,8 @@ from axisight.gap.verdict.cause_words import (
 __all__ = ["Facts", "clear_changes", "headline", "in_order", "named", "within_tolerances"]
 
 _Groups = tuple[tuple[str, ...], ...]
+# Stands for the name of a log until joints are named: the name may hold "axis 3" itself.
+_LOG = "\0"
 _UNFELT = "A torque predicted from the measured motion does not feel this."
 
 
@@ -83,7 +85,9 @@ def headline(facts: Facts) -> str:
         said = _unknown(facts)
     else:
         said = _explained(facts)
-    return with_joints(" ".join(x for x in said if x), facts.joints)
+    text = with_joints(" ".join(x for x in said if x), facts.joints)
+    log = "" if facts.withdrawn is None else facts.withdrawn.log or ""
+    return text.replace(_LOG, log)
 
 
 def within_tolerances(gap: Gap) -> list[int]:
@@ -290,7 +294,7 @@ def _contradiction(facts: Facts) -> str:
         return ""
     of = f"of the {_torque(facts)}"
     before, after, floor = (percent(x) for x in (seen.before, seen.after, seen.floor))
-    there = "" if seen.axis is None else f" on axis {seen.axis} of {seen.log}"
+    there = "" if seen.axis is None else f" on axis {seen.axis} of {_LOG}"
     several = len(seen.causes) > 1
     tried, it = _tried(seen, facts.n_axes), "them" if several else "it"
     not_carried = f"{tried} {'do' if several else 'does'} not carry over to the validation logs"
