@@ -150,21 +150,50 @@ def _none(facts: Facts) -> list[str]:
 
 def _explained(facts: Facts) -> list[str]:
     """Of causes: those that are sure, those that stay open, what they do to the gap, what is left."""
-    still_open = {label for group in facts.open for label in group}
-    certain = [c for c in facts.causes if c.label not in still_open]
-    out = [sure(certain, facts.own, facts.n_axes)] if certain else []
-    return [*out, _open(facts), _effect(facts), _twins(facts), _rest(facts)]
+    return [_sure(facts), _open(facts), _effect(facts), _twins(facts), _rest(facts)]
+
+
+def _sure(facts: Facts) -> str:
+    certain = _certain(facts, facts.causes)
+    return sure(certain, facts.own, facts.n_axes) if certain else ""
+
+
+def _certain(facts: Facts, causes: Sequence[Cause]) -> list[Cause]:
+    """Return those of the causes that do not stay open."""
+    still_open = {label for group in _open_groups(facts) for label in group}
+    return [c for c in causes if c.label not in still_open]
+
+
+def _open_groups(facts: Facts) -> _Groups:
+    """Return what stays open: as the verdict has it, and of an *unknown* arm by the rivals of each cause."""
+    if facts.open or facts.verdict != "unknown":
+        return facts.open
+    twins = {group[0]: group for group in facts.twins}
+    groups = (
+        (c.label, *(x for x in c.rivals if x not in twins.get(c.label, ()))) for c in facts.causes
+    )
+    return tuple(group for group in groups if len(group) > 1)
 
 
 def _open(facts: Facts) -> str:
-    if not facts.open:
+    groups = _open_groups(facts)
+    if not groups:
         return ""
-    choices = [
-        listed(told([placed(label) for label in group], "others"), "or") for group in facts.open
-    ]
+    choices = [listed(told([placed(label) for label in group], "others"), "or") for group in groups]
     return (
         f"Open: {'; '.join(told(choices, 'more such choices'))}. These logs cannot tell them apart."
     )
+
+
+def _with(facts: Facts, causes: Sequence[Cause]) -> str:
+    """Return what is in the simulator with ``causes``, some of them open: the sure ones, and one of each choice."""
+    first = f"the first of {'each' if len(_open_groups(facts)) > 1 else 'them'}"
+    certain = _certain(facts, causes)
+    if not certain:
+        return f"With {first}"
+    if len(certain) < len(_certain(facts, facts.causes)):
+        return f"With {named(certain, facts.n_axes)} and {first}"
+    return f"With {'this cause' if len(certain) == 1 else 'these'} and {first}"
 
 
 def _effect(facts: Facts) -> str:
@@ -183,13 +212,49 @@ def _effect(facts: Facts) -> str:
             f"(noise and steps: {percent(gap.floor)})."
         )
     noise = f"(noise{' and steps' if steps else ''} alone: {percent(gap.floor)})"
-    from_to = f"from {percent(gap.before)} to {percent(gap.after)} {figures} {noise}"
-    cuts = "cuts" if not gap.after >= gap.before else "takes"
+    change = _Change(gap.before, gap.after, f"{what} on validation logs", f" {figures} {noise}", "")
     if facts.open:
-        one = f"the first of {'each' if len(facts.open) > 1 else 'them'}"
-        return f"With {one} the {what} on validation logs goes {from_to}."
-    act = deed(others, facts.own, causes, facts.n_axes)
-    return f"{act} {cuts} the {what} on validation logs {from_to}."
+        return change.when(_with(facts, others))
+    cuts = "takes" if gap.after >= gap.before else "cuts"
+    return change.by(deed(others, facts.own, causes, facts.n_axes), cuts)
+
+
+@dataclass(frozen=True)
+class _Change:
+    """The ``gap`` in words ``before`` and ``after`` causes [1], ``of`` what and beside which noise, ``there``.
+
+    Shares are not finite where a simulation broke off.
+    """
+
+    before: float
+    after: float
+    gap: str
+    of: str
+    there: str
+
+    def when(self, given: str) -> str:
+        """Return the change where causes are ``given``: "With the first of them"; empty for "the causes"."""
+        if math.isfinite(self.before) and math.isfinite(self.after):
+            start = f"{given} the" if given else "The"
+            return f"{start} {self.gap} goes from {percent(self.before)} to {percent(self.after)}{self.of}."
+        start = given or "With the causes"
+        if math.isfinite(self.before):
+            return f"{start} the simulation breaks off{self.there}."
+        broke = f"The simulation as given broke off{self.there}."
+        if math.isfinite(self.after):
+            return f"{broke} {start} the {self.gap} is {percent(self.after)}{self.of}."
+        return f"{broke} {start} it does too."
+
+    def by(self, act: str, verb: str) -> str:
+        """Return the change by what is done about causes: "Adding it", which "cuts" or "takes" the gap."""
+        if math.isfinite(self.before) and math.isfinite(self.after):
+            return f"{act} {verb} the {self.gap} from {percent(self.before)} to {percent(self.after)}{self.of}."
+        if math.isfinite(self.before):
+            return f"{act} makes the simulation break off{self.there}."
+        broke = f"The simulation as given broke off{self.there}."
+        if math.isfinite(self.after):
+            return f"{broke} {act} leaves a {self.gap} of {percent(self.after)}{self.of}."
+        return f"{broke} {act} does not change that."
 
 
 def _felt(facts: Facts) -> list[Cause]:
@@ -224,7 +289,7 @@ def _rest(facts: Facts) -> str:
 def _unknown(facts: Facts) -> list[str]:
     out = []
     if facts.causes:
-        out = [sure(facts.causes, facts.own, facts.n_axes), _effect_in_part(facts)]
+        out = [_sure(facts), _open(facts), _effect_in_part(facts)]
     return [*out, _gap_left(facts), _contradiction(facts)]
 
 
@@ -234,57 +299,87 @@ def _gap_left(facts: Facts) -> str:
     left = gap.after_per_axis if facts.causes else gap.refitted_per_axis
     axes = _unknown_axes(facts, left.tolist())
     if not axes:
+        explains = f"No known effect explains the {gap_of(gap.compared)}"
+        if not math.isfinite(gap.before):
+            return f"{explains}: the simulation as given broke off."
         return (
-            f"No known effect explains the {gap_of(gap.compared)} of {percent(gap.before)} of the "
+            f"{explains} of {percent(gap.before)} of the "
             f"{_torque(facts)} (noise alone: {percent(gap.floor)})."
         )
+    quiet = [x for x in axes if at_floor(float(left[x - 1]), float(gap.floor_per_axis[x - 1]))]
+    if facts.withdrawn is not None and facts.withdrawn.why == "none":
+        # The estimation logs lack nothing, so what is at the floor of the validation logs has no gap at all.
+        axes, quiet = [x for x in axes if x not in quiet], []
+        if not axes:
+            return ""
     first, *others = axes
     value, floor = float(left[first - 1]), float(gap.floor_per_axis[first - 1])
     figures = f"{percent(value)} of the {_torque(facts)} (noise alone: {percent(floor)})"
     where = next((_regime(w) for w in facts.where if w.axis == first), "")
-    if at_floor(value, floor):
+    if first in quiet:
         if facts.withdrawn is not None:
-            return f"Axis {first} has a gap on the estimation logs{where}, but not on the validation logs: {figures}."
-        return (
-            f"Axis {first} has an error on the estimation logs that no known effect explains{where}. "
-            f"On validation logs it does not stand out: {figures}."
-        )
-    if not math.isfinite(value):
-        return (
+            text = f"Axis {first} has a gap on the estimation logs{where}, but not on the validation logs: {figures}."
+        else:
+            text = (
+                f"Axis {first} has an error on the estimation logs that no known effect explains{where}. "
+                f"On validation logs it does not stand out: {figures}."
+            )
+        return f"{text} {_too(others, 'one too')}".strip()
+    if math.isfinite(value):
+        text = f"Axis {first} has a {gap_of(gap.compared)} that no known effect explains: {figures}{where}."
+    else:
+        text = (
             f"Axis {first} has a gap that no known effect explains: the simulation broke off there."
         )
-    text = f"Axis {first} has a {gap_of(gap.compared)} that no known effect explains: {figures}{where}."
-    too = f"{_capital(place(sorted(others), 0))} {'have' if len(others) > 1 else 'has'} one too."
-    return f"{text} {too}" if others else text
+    clear = _too([x for x in others if x not in quiet], "one too")
+    return " ".join(x for x in (text, clear, _too(quiet, "one on the estimation logs alone")) if x)
+
+
+def _too(axes: Sequence[int], what: str) -> str:
+    """Return that other axes have a gap as well; empty of none."""
+    if not axes:
+        return ""
+    return f"{_capital(place(sorted(axes), 0))} {'have' if len(axes) > 1 else 'has'} {what}."
 
 
 def _unknown_axes(facts: Facts, left: Sequence[float]) -> list[int]:
-    """Return the axes that are unknown: that of the first place first, then by how far they stand above the floor."""
+    """Return the axes that are unknown, the one to be told first.
+
+    Axes at their floor come last. Of the others that of the first place leads, then they go by how far they
+    stand above the floor.
+    """
     floor = facts.gap.floor_per_axis.tolist()
     leads = facts.where[0].axis if facts.where else 0
 
-    def order(axis: int) -> tuple[bool, float]:
-        above = left[axis - 1] ** 2 - floor[axis - 1] ** 2
-        return axis != leads, -above if math.isfinite(above) else -math.inf
+    def order(axis: int) -> tuple[bool, bool, float]:
+        value, noise = left[axis - 1], floor[axis - 1]
+        above = value**2 - noise**2
+        size = -above if math.isfinite(above) else -math.inf
+        return at_floor(value, noise), axis != leads, size
 
     return sorted((a.axis for a in facts.axes if a.verdict == "unknown"), key=order)
 
 
 def _effect_in_part(facts: Facts) -> str:
     """Return what the causes of other axes do there."""
-    gap = facts.gap
-    axes = sorted({a for c in facts.causes for a in axes_of(c)})
+    gap, felt = facts.gap, _felt(facts)
+    if not felt:
+        return _UNFELT
+    given = _with(facts, felt) if _open_groups(facts) else ""
+    axes = sorted({a for c in felt for a in axes_of(c)})
     if len(axes) != 1:
-        return (
-            f"The {gap_of(gap.compared)} on validation logs goes from {percent(gap.before)} to "
-            f"{percent(gap.after)} of the {_torque(facts)} (noise alone: {percent(gap.floor)})."
-        )
+        of = f" of the {_torque(facts)} (noise alone: {percent(gap.floor)})"
+        what = f"{gap_of(gap.compared)} on validation logs"
+        return _Change(gap.before, gap.after, what, of, "").when(given)
+    axis = axes[0]
     before, after, floor = (
-        percent(float(x[axes[0] - 1]))
-        for x in (gap.before_per_axis, gap.after_per_axis, gap.floor_per_axis)
+        float(x[axis - 1]) for x in (gap.before_per_axis, gap.after_per_axis, gap.floor_per_axis)
     )
-    act = deed(facts.causes, facts.own, facts.causes, facts.n_axes)
-    return f"{act} takes the gap of axis {axes[0]} from {before} to {after} (noise alone: {floor})."
+    noise = f" (noise alone: {percent(floor)})"
+    change = _Change(before, after, f"gap of axis {axis}", noise, f" on axis {axis}")
+    if given:
+        return change.when(given)
+    return change.by(deed(felt, facts.own, facts.causes, facts.n_axes), "takes")
 
 
 def _contradiction(facts: Facts) -> str:
@@ -299,15 +394,22 @@ def _contradiction(facts: Facts) -> str:
     tried, it = _tried(seen, facts.n_axes), "them" if several else "it"
     not_carried = f"{tried} {'do' if several else 'does'} not carry over to the validation logs"
     if seen.why == "none":
+        is_left = f"{after} {of} is left{there} (noise alone: {floor})"
+        if not math.isfinite(seen.after):
+            is_left = f"the simulation broke off{there}"
         return (
-            f"The estimation logs lack no effect, but that does not carry over to the validation logs: {after} "
-            f"{of} is left{there} (noise alone: {floor})."
+            "The estimation logs lack no effect, but that does not carry over to the validation logs: "
+            f"{is_left}."
         )
     if seen.why == "bent":
         return (
             f"{tried} would explain it only with {100 * seen.share:.0f} % of the simulator's own parameters at the "
             "edge of their tolerance."
         )
+    if not math.isfinite(seen.after):
+        return f"{not_carried}: with {it} the simulation breaks off{there}."
+    if not math.isfinite(seen.before):
+        return f"{not_carried}: the gap{there} is {after} {of} with {it}, and without {it} the simulation broke off."
     if seen.why == "part":
         explain = "explain" if several else "explains"
         only = f"{tried} {explain} only a part"

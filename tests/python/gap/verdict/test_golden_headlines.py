@@ -156,8 +156,25 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
     "undecidable beside a sure cause": (
         PAIR,
         "The simulator lacks Coulomb friction on axis 1 (pan). Open: another link mass on axis 1 or a payload. "
-        "These logs cannot tell them apart. With the first of them the gap on validation logs goes from 91.3 % to "
-        "3.9 % of the torque (noise alone: 3.5 %).",
+        "These logs cannot tell them apart. With this cause and the first of them the gap on validation logs goes "
+        "from 91.3 % to 3.9 % of the torque (noise alone: 3.5 %).",
+    ),
+    "undecidable beside two sure causes": (
+        replace(PAIR, causes=(*PAIR.causes, COULOMB)),
+        "The simulator lacks Coulomb friction on axes 1 (pan) and 2 (shoulder). Open: another link mass on axis 1 or "
+        "a payload. These logs cannot tell them apart. With these and the first of them the gap on validation logs "
+        "goes from 91.3 % to 3.9 % of the torque (noise alone: 3.5 %).",
+    ),
+    "undecidable, the simulation as given broke off": (
+        replace(PAIR, gap=gap(whole=(np.nan, np.nan, 0.039, 0.035))),
+        "The simulator lacks Coulomb friction on axis 1 (pan). Open: another link mass on axis 1 or a payload. "
+        "These logs cannot tell them apart. The simulation as given broke off. With this cause and the first of them "
+        "the gap on validation logs is 3.9 % of the torque (noise alone: 3.5 %).",
+    ),
+    "explained, the simulation as given broke off": (
+        replace(ONE, gap=gap(whole=(np.nan, np.nan, 0.077, 0.078))),
+        "The simulator lacks Coulomb friction on axis 2 (shoulder). The simulation as given broke off. Adding it "
+        "leaves a gap on validation logs of 7.7 % of the torque (noise alone: 7.8 %).",
     ),
     "undecidable, three groups": (
         replace(
@@ -207,6 +224,32 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
         ),
         "Axis 4 (wrist_1) has a gap that no known effect explains: 77 % of the torque (noise alone: 1.4 %), mostly "
         "at 0.5-6 Hz (speed: slow). Axes 1 (pan) and 3 (elbow) have one too.",
+    ),
+    "unknown on one axis, an open cause on another": (
+        replace(
+            UNKNOWN,
+            gap=gap(QUIET, (0.4, 0.3, 0.06, 0.05), QUIET, (0.78, 0.77, 0.77, 0.014)),
+            axes=axes(a2="explained", a4="unknown"),
+            causes=(replace(COULOMB, rivals=("torque_offset@2",)),),
+        ),
+        "Open: Coulomb friction on axis 2 (shoulder) or a torque offset on axis 2. These logs cannot tell them apart. "
+        "With the first of them the gap of axis 2 goes from 40 % to 6 % (noise alone: 5 %). Axis 4 (wrist_1) has a "
+        "gap that no known effect explains: 77 % of the torque (noise alone: 1.4 %), mostly at 0.5-6 Hz "
+        "(speed: slow).",
+    ),
+    "unknown on three axes, the place named first is at the floor": (
+        replace(
+            UNKNOWN,
+            gap=gap((0.3, 0.3, 0.3, 0.05), QUIET, (0.2, 0.2, 0.2, 0.05), QUIET),
+            axes=axes(a1="unknown", a3="unknown", a4="unknown"),
+        ),
+        "Axis 1 (pan) has a gap that no known effect explains: 30 % of the torque (noise alone: 5 %). Axis 3 (elbow) "
+        "has one too. Axis 4 (wrist_1) has one on the estimation logs alone.",
+    ),
+    "unknown on two axes at the floor": (
+        replace(UNKNOWN, gap=gap(), where=(), axes=axes(a3="unknown", a4="unknown")),
+        "Axis 3 (elbow) has an error on the estimation logs that no known effect explains. On validation logs it "
+        "does not stand out: 5 % of the torque (noise alone: 5 %). Axis 4 (wrist_1) has one too.",
     ),
     "unknown by the estimation logs alone, at the floor of the validation logs": (
         replace(UNKNOWN, gap=gap(), where=()),
@@ -263,6 +306,13 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
         "Axis 4 (wrist_1) has a gap that no known effect explains: 77 % of the torque (noise alone: 1.4 %), mostly "
         "at 0.5-6 Hz (speed: slow). The estimation logs lack no effect, but that does not carry over to the "
         "validation logs: 77 % of the torque is left on axis 4 of run_9 (noise alone: 1.4 %).",
+    ),
+    "none that does not carry over, at the floor over all logs": (
+        replace(
+            UNKNOWN, gap=gap(), withdrawn=Withdrawal("none", 0.77, 0.77, 0.014, 4, "run_9")
+        ),
+        "The estimation logs lack no effect, but that does not carry over to the validation logs: 77 % of the torque "
+        "is left on axis 4 (wrist_1) of run_9 (noise alone: 1.4 %).",
     ),
     "noise larger than the gap": (
         replace(
@@ -364,6 +414,20 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
             where=(),
         ),
         "Axis 4 (wrist_1) has a gap that no known effect explains: the simulation broke off there.",
+    ),
+    "a simulation that broke off, a gap on two more axes": (
+        replace(
+            UNKNOWN,
+            gap=gap((0.3, 0.3, 0.3, 0.05), QUIET, (0.2, 0.2, 0.2, 0.05), (np.nan, np.nan, np.nan, 0.014)),
+            axes=axes(a1="unknown", a3="unknown", a4="unknown"),
+            where=(),
+        ),
+        "Axis 4 (wrist_1) has a gap that no known effect explains: the simulation broke off there. Axes 1 (pan) and 3 "
+        "(elbow) have one too.",
+    ),
+    "a simulation that broke off, the whole arm": (
+        replace(UNKNOWN, gap=gap(whole=(np.nan, np.nan, np.nan, 0.05)), axes=axes(), where=()),
+        "No known effect explains the gap: the simulation as given broke off.",
     ),
 }  # fmt: skip
 
