@@ -21,7 +21,7 @@ from axisight.gap.facts.result import (
     VerdictKind,
     Where,
 )
-from axisight.gap.verdict.headline import in_order, within_tolerances
+from axisight.gap.verdict.headline import NO_VERDICT, in_order, within_tolerances
 from axisight.report.account import account
 from axisight.report.colors import shade
 from axisight.report.figures import TOP, overlays_by_log, ranking_bars
@@ -60,6 +60,10 @@ _WITHIN = (
     "None, once re-fitted",
     "The re-fit of the simulator's own parameters within their tolerances removes the gap. The rest is at the floor.",
 )
+_NO_VERDICT = (
+    NO_VERDICT,
+    "The estimated noise is larger than the gap, so the logs cannot show what the simulator lacks.",
+)
 # Names of a diagnosis that say nothing of it.
 _NO_CASE = "logs"
 # Values beside the headline: about its height with a few causes, all friction of a six-axis arm.
@@ -92,6 +96,8 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
     badge, meaning = _VERDICTS[diagnosis.verdict]
     if diagnosis.verdict == "none" and within_tolerances(diagnosis.gap):
         badge, meaning = _WITHIN
+    if diagnosis.headline.startswith(NO_VERDICT):
+        badge, meaning = _NO_VERDICT
     logs, left_out = overlays_by_log(diagnosis)
     ranking = ranked(diagnosis)
     measured = "measured" if diagnosis.gap.compared == "torques" else ""

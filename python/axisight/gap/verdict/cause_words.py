@@ -11,6 +11,7 @@ from axisight.gap.facts.wording import listed
 
 # Numbers of axes in words.
 _COUNTS = {2: "both", 3: "all three", 4: "all four", 5: "all five", 6: "all six", 7: "all seven"}
+_Places = tuple[tuple[int, ...], ...]
 MOST = 4
 """Items of a list that a sentence tells: effects, wrong values, changes of the re-fit. More are counted."""
 
@@ -87,7 +88,7 @@ def _is_wrong(cause: Cause, own: Sequence[Effect]) -> bool:
 
 def _of_simulator(cause: Cause, own: Sequence[Effect]) -> Effect | None:
     """Return the effect of the simulator that a cause gives other values."""
-    same = (e for e in own if e.acts and (e.name, e.axis) == (cause.effect, cause.axis))
+    same = (e for e in own if e.acts and e.label == cause.label)
     return next(same, None)
 
 
@@ -99,27 +100,37 @@ def told(phrases: Sequence[str], rest: str = "more effects") -> list[str]:
 
 
 def _phrases(causes: Sequence[Cause], n_axes: int) -> list[str]:
-    axes: dict[str, list[int]] = {}
+    by_effect: dict[str, list[Cause]] = {}
     for c in in_order(causes):
-        axes.setdefault(c.effect, []).extend(axes_of(c))
-    phrases: dict[tuple[str, str, tuple[int, ...]], list[str]] = {}
-    for effect, mine in axes.items():
+        by_effect.setdefault(c.effect, []).append(c)
+    phrases: dict[tuple[str, str, _Places], list[str]] = {}
+    for effect, mine in by_effect.items():
         start = article(effect)
         start = start if start in ("a", "an") else ""
         adjective, _, head = noun(effect).rpartition(" ")
         # Two delays are two things; friction of two kinds is one.
         shared = noun(effect) if start else head
-        key = (start, shared, tuple(mine))
+        key = (start, shared, _places(mine))
         phrases.setdefault(key, []).append(adjective if shared == head else "")
-    places: dict[tuple[int, ...], list[str]] = {}
+    places: dict[_Places, list[str]] = {}
     for (start, head, where), adjectives in phrases.items():
         text = " ".join(x for x in (start, listed(adjectives), head) if x)
         places.setdefault(where, []).append(text)
-    return [f"{listed(texts)} {_on(where, n_axes)}".strip() for where, texts in places.items()]
+    return [
+        f"{listed(texts)} {_at(where, 'on', n_axes)}".strip() for where, texts in places.items()
+    ]
 
 
-def _on(axes: Sequence[int], n_axes: int) -> str:
-    return f"on {place(axes, n_axes)}" if axes else ""
+def _places(causes: Sequence[Cause]) -> _Places:
+    """Return where causes of one effect act: all single axes together, and each pair of axes by itself."""
+    single = tuple(dict.fromkeys(a for c in causes if c.axes is None for a in axes_of(c)))
+    pairs = dict.fromkeys(c.axes for c in causes if c.axes is not None)
+    return (*((single,) if single else ()), *pairs)
+
+
+def _at(places: _Places, preposition: str, n_axes: int) -> str:
+    """Return places in words: "on axes 1 and 2", "on axes 1 and 2 and on axes 2 and 3"; empty of none."""
+    return listed([f"{preposition} {place(axes, n_axes)}" for axes in places] or [""])
 
 
 def _wrong(causes: Sequence[Cause], own: Sequence[Effect], n_axes: int) -> list[str]:
@@ -130,12 +141,12 @@ def _wrong(causes: Sequence[Cause], own: Sequence[Effect], n_axes: int) -> list[
     out = []
     for effect in dict.fromkeys(c.effect for c in causes):
         mine = [c for c in causes if c.effect == effect]
-        where = place([a for c in mine for a in axes_of(c)], n_axes)
+        where = _at(_places(mine), "of", n_axes)
         numbers = [text for c in mine if (text := _of_machine(c, _of_simulator(c, own)))]
         few = 0 < len(numbers) == len(mine) <= MOST
         machine = f" (machine: {listed(numbers)})" if few else ""
         out.append(
-            f"the {noun(effect)}{f' of {where}' if where else ''} is wrong in the simulator{machine}"
+            f"the {noun(effect)}{f' {where}' if where else ''} is wrong in the simulator{machine}"
         )
     return out
 

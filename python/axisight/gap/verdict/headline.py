@@ -36,9 +36,19 @@ from axisight.gap.verdict.cause_words import (
     told,
 )
 
-__all__ = ["Facts", "clear_changes", "headline", "in_order", "named", "within_tolerances"]
+__all__ = [
+    "NO_VERDICT",
+    "Facts",
+    "clear_changes",
+    "headline",
+    "in_order",
+    "named",
+    "within_tolerances",
+]
 
 _Groups = tuple[tuple[str, ...], ...]
+NO_VERDICT = "No verdict"
+"""Start of the headline where the data have a fault that hides the gap."""
 # Stands for the name of a log until joints are named: the name may hold "axis 3" itself.
 _LOG = "\0"
 _UNFELT = "A torque predicted from the measured motion does not feel this."
@@ -108,7 +118,7 @@ def _no_verdict(facts: Facts) -> list[str]:
     """Of noise that is larger than the gap: a fault of the data."""
     gap = facts.gap
     return [
-        f"No verdict: the noise estimated from the logs, {percent(gap.floor)} of the {_torque(facts)}, is larger "
+        f"{NO_VERDICT}: the noise estimated from the logs, {percent(gap.floor)} of the {_torque(facts)}, is larger "
         f"than the gap of {percent(gap.refitted)}.",
         "Look for glitches and for frozen or missing samples with `axisight check`.",
     ]
@@ -387,32 +397,33 @@ def _contradiction(facts: Facts) -> str:
     seen = facts.withdrawn
     if seen is None:
         return ""
-    of = f"of the {_torque(facts)}"
-    before, after, floor = (percent(x) for x in (seen.before, seen.after, seen.floor))
     there = "" if seen.axis is None else f" on axis {seen.axis} of {_LOG}"
+    if seen.why == "none":
+        left = f"{percent(seen.after)} of the {_torque(facts)} is left{there} (noise alone: {percent(seen.floor)})"
+        if not math.isfinite(seen.after):
+            left = f"the simulation broke off{there}"
+        return f"The estimation logs lack no effect, but that does not carry over to the validation logs: {left}."
+    if seen.why == "bent":
+        return (
+            f"{_tried(seen, facts.n_axes)} would explain it only with {100 * seen.share:.0f} % of the simulator's "
+            "own parameters at the edge of their tolerance."
+        )
+    return _not_carried(seen, facts, there)
+
+
+def _not_carried(seen: Withdrawal, facts: Facts, there: str) -> str:
+    """Return what causes of the estimation logs do to the gap on the validation logs, ``there``."""
+    of = f"of the {_torque(facts)}"
+    before, after = percent(seen.before), percent(seen.after)
     several = len(seen.causes) > 1
     tried, it = _tried(seen, facts.n_axes), "them" if several else "it"
     not_carried = f"{tried} {'do' if several else 'does'} not carry over to the validation logs"
-    if seen.why == "none":
-        is_left = f"{after} {of} is left{there} (noise alone: {floor})"
-        if not math.isfinite(seen.after):
-            is_left = f"the simulation broke off{there}"
-        return (
-            "The estimation logs lack no effect, but that does not carry over to the validation logs: "
-            f"{is_left}."
-        )
-    if seen.why == "bent":
-        return (
-            f"{tried} would explain it only with {100 * seen.share:.0f} % of the simulator's own parameters at the "
-            "edge of their tolerance."
-        )
     if not math.isfinite(seen.after):
         return f"{not_carried}: with {it} the simulation breaks off{there}."
     if not math.isfinite(seen.before):
-        return f"{not_carried}: the gap{there} is {after} {of} with {it}, and without {it} the simulation broke off."
+        return f"{not_carried}: with {it} the gap{there} is {after} {of}, and without {it} the simulation broke off."
     if seen.why == "part":
-        explain = "explain" if several else "explains"
-        only = f"{tried} {explain} only a part"
+        only = f"{tried} {'explain' if several else 'explains'} only a part"
         return f"{only}: with {it} the gap on validation logs goes from {before} to {after} {of}."
     if seen.why == "refit":
         return (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -112,15 +113,34 @@ def test_places_ranking_words_and_cells_agree_with_the_axes(made, random):
         assert all("before the causes" in p.evidence for p in places)
     facts = Facts(arm, table(evidence), axes, named(arm, causes), where=places)
     text = headline(facts)
-    for axis, word in words.items():
-        if word == "none" and f"axis {axis} " in text.lower():
-            raise AssertionError(f"{text} names axis {axis}, which is none")
+    mentioned = axes_in(text)
+    quiet = {a for a, word in words.items() if word == "none"}
+    assert not mentioned & quiet, f"{text} names axes {mentioned & quiet}, which are none"
+    left = facts.gap.after_per_axis if facts.causes else facts.gap.refitted_per_axis
+    unknown = {
+        a for a, word in words.items()
+        if word == "unknown" and not at_floor(left[a - 1], facts.gap.floor_per_axis[a - 1])
+    }  # fmt: skip
+    assert unknown <= mentioned, f"{text} does not name axes {unknown - mentioned}"
     shown = replace(
         explained(len(axes)), axes=axes, verdict=arm, band_map=bands, regime_maps=regimes
     )
     for m in gap_maps(shown):
         quiet = [i for i, axis in enumerate(m.axes) if words[axis] == "none"]
         assert not m.significant[quiet].any()
+
+
+def axes_in(text: str) -> set[int]:
+    """The axes that a text names: "axis 2", "axes 1, 2 and 3", but not the 4 of "axis 2 and 4 more effects"."""
+    lists = re.findall(
+        r"\baxis (\d+)|\baxes (\d+(?:(?:, | and )\d+\b(?! more))*)", text, re.IGNORECASE
+    )
+    return {int(n) for found in lists for n in re.findall(r"\d+", "".join(found))}
+
+
+def test_mentions_of_axes():
+    text = "Axis 4 leads. Axes 1, 2 and 3 have one too: on axis 5 and 7 more effects, on axes 8 and 9 and 6 more."
+    assert axes_in(text) == {1, 2, 3, 4, 5, 8, 9}
 
 
 def maps(rng: np.random.Generator, n_axes: int) -> tuple[xr.Dataset, dict[str, xr.Dataset]]:

@@ -7,9 +7,11 @@ import pytest
 from axisight.effects import effect_table, noun, phrase, title
 from axisight.gap.facts.axis_names import placed
 from axisight.gap.facts.result import Cause, Interval
+from axisight.gap.facts.withdrawal import Withdrawal
 from axisight.gap.verdict.headline import Facts, headline, named
+from axisight.report.page import render_report
 from axisight.report.wording import plain_name, torque_unit, torque_word
-from diagnosis_data import explained, gap
+from diagnosis_data import explained, gap, of
 
 ONE = Interval(1.0, 1.0, 1.0)
 
@@ -111,3 +113,13 @@ def test_every_effect_can_stand_in_a_sentence(name):
 )
 def test_causes_are_grouped(causes, words):
     assert named(causes, 6) == words
+
+
+def test_a_page_without_a_verdict_says_nothing_of_a_gap():
+    noisy = gap(0.5, 0.5, 0.5, 0.9, 3)
+    text = headline(Facts("unknown", noisy, withdrawn=Withdrawal("noise", 0.5, 0.5, 0.9)))
+    page = render_report(replace(of("unknown"), gap=noisy, headline=text))
+    assert '<span class="badge unknown">No verdict</span>' in page
+    assert "The estimated noise is larger than the gap" in page
+    assert "A gap remains" not in page
+    assert "A gap remains" in render_report(of("unknown"))
