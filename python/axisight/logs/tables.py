@@ -299,9 +299,8 @@ def _numbers(column: _Column, n: int, joints: Sequence[str], name: str) -> list[
     """Return the axes (from 1) of an array's columns; none where the labels are other joints."""
     usual = list(range(1, n + 1))
     labels = [str(label) if isinstance(label, str) else label for label in column.axes or usual]
-    if not all(isinstance(label, str) for label in labels) or all(
-        label.isdecimal() for label in labels
-    ):
+    texts = [label for label in labels if isinstance(label, str)]
+    if len(texts) < n or all(label.isdecimal() for label in texts):
         if [str(label).removesuffix(".0") for label in labels] != [str(k) for k in usual]:
             raise LogError(
                 f"{name}: {short(column.name)}: axes: expected the labels 1 to {n} in order, or joint "
