@@ -211,4 +211,4 @@ def test_the_command_names_the_option_that_is_no_list_of_numbers(tmp_path, optio
     result = CliRunner().invoke(app, ["excite", "--out", str(out), option, "2;4"])
     assert result.exit_code == 2 and not out.exists()
     text = " ".join(result.output.split())
-    assert f"{option}: expected numbers with commas between, got '2;4'" in text
+    assert f"{option}: expected numbers separated by commas, got '2;4'" in text

@@ -132,7 +132,7 @@ def test_the_command_writes_table_and_page(fleet, tmp_path, verdicts):
     for wrong, says in (
         (["--fleet", str(small)], "--out"),
         (["--fleet", str(small), "--out", str(out), "--json", "x"], "--json"),
-        ([str(small), "--scheduler", "tcp://x"], "--fleet only"),
+        ([str(small), "--scheduler", "tcp://x"], "expected --fleet FOLDER"),
         ([], "--fleet FOLDER"),
     ):
         refused = CliRunner().invoke(app, ["diagnose", *wrong])
