@@ -26,7 +26,7 @@ HOSTILE = (
 
 def read(page: str) -> str:
     """A page with every run of white space, unbroken spaces too, as one space."""
-    return " ".join(page.split())
+    return " ".join(page.replace("&nbsp;", " ").split())
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
