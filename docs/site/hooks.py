@@ -28,7 +28,7 @@ FIRST = {
     "index.md": 4,
     "start_diagnose.md": 2,
     "ten_minutes.md": 2,
-    "undecidable.md": 2,
+    "undecidable.md": 3.5,
     "robot_files.md": 2,
     OUTSIDE + "CONTRIBUTING.md": 2,
 }

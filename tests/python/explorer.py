@@ -97,7 +97,7 @@ class Visit:
     def cell(self, table: str, row: int, column: str) -> Any:
         """The cell of a table by its row, from 1, and the head of its column."""
         heads = self.page.locator(f"#{table} th").all_inner_texts()
-        return self.page.locator(f"#{table} tbody tr:nth-child({row}) td").nth(heads.index(column))
+        return self.page.locator(f"#{table} tbody tr:nth-child({row}) > *").nth(heads.index(column))
 
     def share(self, table: str, row: int, column: str) -> float:
         """A cell of per cents as a number."""

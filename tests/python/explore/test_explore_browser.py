@@ -86,7 +86,7 @@ def test_what_the_diagnosis_said(running, found, tmp_path):
     """Its causes and re-fitted values give its gap; they leave in a robot file and outlive a reload."""
     with visit(running.url) as seen:
         page = seen.page
-        assert found.headline in page.locator("p.said").inner_text()
+        assert found.headline in page.locator("p.said").inner_text().replace("\xa0", " ")
         seen.click("add the cause")
         seen.choose("own parameters", "re-fitted")
         for axis in (1, 2, 3):
@@ -195,7 +195,7 @@ def test_figures_hold_what_was_simulated(running):
             page.get_by_text(tab, exact=True).click()
         assert page.locator("#bands-3 tbody tr").count() == 7
         seen.click("clear pins")
-        expect(page.locator("#gaps th")).to_have_text(["axis", "as given", "as chosen"])
+        expect(page.locator("#gaps thead th")).to_have_text(["axis", "as given", "as chosen"])
         assert seen.wrong == []
 
 
@@ -211,9 +211,7 @@ def test_without_references_the_torque_is_predicted_from_the_motion(case, tmp_pa
         pq.write_table(table.select(kept), path)
     with explorer(bare) as served, visit(served.url) as seen:
         page = seen.page
-        expect(
-            page.get_by_text(re.compile(r"^Inverse dynamics: .* low-pass of [\d.]+ Hz"))
-        ).to_be_visible()
+        expect(page.get_by_text(re.compile(r"^Inverse dynamics: "))).to_be_visible()
         seen.choose("axis", "axis 2")
         seen.choose("cause", "Coulomb friction")
         seen.choose("where", "axis 2")

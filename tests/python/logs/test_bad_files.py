@@ -59,7 +59,7 @@ SAID: dict[str, tuple[type[Exception], dict[str, str]]] = {
             "lerobot_cut": UNREADABLE,
         },
     ),
-    "columns": (LogError, TOML | {"unknown": r"axis\.0\.position: "}),
+    "columns": (LogError, TOML | {"unknown": "axis 1: position: "}),
     "case": (CaseError, TOML | {"unknown": "schema: "}),
     "robot": (
         RobotError,

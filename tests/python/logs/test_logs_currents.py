@@ -65,7 +65,7 @@ def test_a_current_that_nothing_makes_a_torque_is_refused(tmp_path: Path):
         read_log(log, columns, robot=half)
     with pytest.raises(LogError, match=r"axis 1: torque: expected scale .*a robot"):
         read_log(log, columns)
-    with pytest.raises(LogError, match=r"scale \(Nm or N per V\) is needed"):
+    with pytest.raises(LogError, match=r"expected scale \(Nm or N per V\) beside it"):
         parse_column_map(column_map(unit="V"))
     found = check_log(log, columns)
     assert found.ok

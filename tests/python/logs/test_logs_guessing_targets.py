@@ -123,9 +123,7 @@ def test_the_last_line_says_what_has_to_be_filled_in(tmp_path, more, words):
     result = CliRunner().invoke(app, [*map(str, said)])
     assert result.exit_code == 0, result.output
     last = "then: " + " ".join(result.output.split("then: ")[1].split())
-    assert re.match(
-        f"then: the map is not complete yet: .*{words}.*; after that axisight check", last
-    )
+    assert re.match(rf"then: complete the map \(.*{words}.*\), and run axisight check", last)
     assert re.search(f"^# not complete yet: .*{words}", out.read_text(), re.MULTILINE)
 
 

@@ -188,7 +188,7 @@ def test_periods_without_end(tmp_path, period):
         'schema = "axisight.case/1"\nname = "c"\nrobot = "robot.toml"\n'
         f'[[log]]\nfile = "a.csv"\nrole = "estimation"\nperiod_s = {period}\n'
     )
-    with pytest.raises(CaseError, match=r"log\.0\.period_s: ") as caught:
+    with pytest.raises(CaseError, match=r"log 1: period_s: ") as caught:
         read_case(tmp_path)
     assert len(str(caught.value)) < 500
 
