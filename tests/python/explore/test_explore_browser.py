@@ -117,7 +117,7 @@ def test_it_fits_a_phone_and_every_reader(running):
     with visit(running.url, width=400) as seen:
         page = seen.page
         for tab in ("time", "residual against", "orders", "bands", "response"):
-            page.get_by_text(tab, exact=True).click()
+            page.locator(".bk-tab", has_text=re.compile(f"^{tab}$")).click()
             page.wait_for_timeout(1000)
             assert page.evaluate("document.documentElement.scrollWidth") <= 400, tab
             assert page.evaluate(WIDEST) <= 400, tab
@@ -192,7 +192,7 @@ def test_figures_hold_what_was_simulated(running):
             f"() => {{ const x = ({DATA})('position-measured')[0]; return x[x.length - 1] < 2; }}"
         )
         for tab in ("residual against", "orders", "bands", "response"):
-            page.get_by_text(tab, exact=True).click()
+            page.locator(".bk-tab", has_text=re.compile(f"^{tab}$")).click()
         assert page.locator("#bands-3 tbody tr").count() == 7
         seen.click("clear pins")
         expect(page.locator("#gaps thead th")).to_have_text(["axis", "as given", "as chosen"])
@@ -220,7 +220,7 @@ def test_without_references_the_torque_is_predicted_from_the_motion(case, tmp_pa
         expect(seen.cell("gaps", 2, "as chosen")).not_to_have_text(f"{given:g} %")
         assert seen.share("gaps", 2, "as chosen") < 0.6 * given
         assert len(page.evaluate(DATA, "position-now")[0]) == 0
-        page.get_by_text("response", exact=True).click()
+        page.locator(".bk-tab", has_text=re.compile("^response$")).click()
         page.wait_for_function(f"() => ({DATA})('response-now-2')[0].length == 300")
         # What changes no torque computed from the measured motion is not offered.
         offered = page.get_by_label("cause", exact=True).locator("option").all_inner_texts()

@@ -268,13 +268,13 @@ class _Change:
 
 
 def _felt(facts: Facts) -> list[Cause]:
-    """Return the causes that the gap feels: by inverse dynamics those of the controller make none of it."""
+    """Return the causes that the gap feels: by inverse dynamics those off the machine may make none of it."""
     if facts.mode != "inverse_dynamics":
         return list(facts.causes)
     return [
         c
         for c in facts.causes
-        if effect_info(c.effect).acts != "controller"
+        if effect_info(c.effect).acts not in ("controller", "sensor")
         or not c.gap_reduction.low == c.gap_reduction.high == 0.0
     ]
 
