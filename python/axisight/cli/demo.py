@@ -105,5 +105,6 @@ def demo_command(
         say(f"case: {case} (a simulated machine with an effect its simulator lacks)")
         with bars() as progress:
             found = diagnose(case, progress=progress)
-        show_diagnosis(found, verbose=verbose, given=("--json", "--report"))
+        again = f"axisight diagnose {case}"
+        show_diagnosis(found, verbose=verbose, given=("--json", "--report"), command=again)
         write_each(diagnosis_writes(found, verdict, page))

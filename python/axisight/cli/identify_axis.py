@@ -18,6 +18,7 @@ from axisight.cli.identify_common import (
     band,
     check_out,
     load_source,
+    option_names,
     option_words,
     options,
     provenance,
@@ -185,7 +186,7 @@ def axis_command(
             notch_band_hz=band("--notch-band-hz", notch_band_hz),
             plateau_from_hz=plateau_from_hz,
         )
-        say(option_words(found.report(), ctx.params))
+        say(option_words(found.report(), option_names(ctx)))
         if machine is not None:
             against = axisight.graybox.compare_with_robot(found.fit, machine, number)
             for text in against.findings:

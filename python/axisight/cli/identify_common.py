@@ -146,17 +146,22 @@ def as_options(ctx: typer.Context) -> Iterator[None]:
     try:
         yield
     except AxisightError as error:
-        raise InputError(option_words(str(error), ctx.params)) from None
+        raise InputError(option_words(str(error), option_names(ctx))) from None
 
 
 # Keyword arguments whose option has another name.
 _OPTIONS = {'deficient="group"': "--group", "`known`": "--known"}
 
 
+def option_names(ctx: typer.Context) -> list[str]:
+    """Return the names of a command's options, as its function has them; arguments have no dashes."""
+    return [p.name for p in ctx.command.params if p.name and p.param_type_name == "option"]
+
+
 def option_words(text: str, options: Collection[str]) -> str:
     """Return a message with ``cutoff_hz`` as ``--cutoff-hz``, and ``method="wls"`` as ``--method wls``.
 
-    ``options``: names of the parameters of the command.
+    ``options``: names of the options of the command.
     """
 
     def given(found: re.Match[str]) -> str:

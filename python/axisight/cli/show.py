@@ -41,16 +41,19 @@ def show_account(found: Diagnosis) -> None:
         say(line)
 
 
-def show_diagnosis(found: Diagnosis, *, verbose: bool = False, given: Collection[str] = ()) -> None:
+def show_diagnosis(
+    found: Diagnosis, *, verbose: bool = False, given: Collection[str] = (), command: str = ""
+) -> None:
     """Print a diagnosis in 25 lines, or all tables with ``verbose``.
 
-    ``given``: options of files that are written, which need not be offered.
+    ``given``: options of files that are written, which need not be offered. ``command``: what takes the options
+    that are offered; empty for the command that runs.
     """
     if verbose:
         _show_all(found)
-        say(f"next: {' '.join(next_steps(found, given))}")
+        say(f"next: {' '.join(next_steps(found, given, command))}")
         return
-    first, *rest = summary(found, OUT.width, given)
+    first, *rest = summary(found, OUT.width, given, command)
     OUT.print(f"[bold]{escape(found.verdict)}[/]", end="")
     say(first.removeprefix(found.verdict))
     for line in rest:

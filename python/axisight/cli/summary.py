@@ -51,17 +51,20 @@ _DETAILS = (
 )
 
 
-def summary(found: Diagnosis, width: int, given: Collection[str] = ()) -> list[str]:
+def summary(
+    found: Diagnosis, width: int, given: Collection[str] = (), command: str = ""
+) -> list[str]:
     """Return the lines of a diagnosis for a screen of ``width`` columns, the verdict first.
 
     ``given``: options of files that are written anyway, each with a line of its own later.
+    ``command``: what takes the options that are offered, where that is not the command that was just run.
     """
     width = min(max(width, _NARROWEST), _WIDEST)
     most = MOST_LINES - len(given)
     lines: list[str] = []
     for detail in _DETAILS:
         sections = [part(found, width, detail) for part in _SECTIONS]
-        sections.append(_next(found, given, width, detail))
+        sections.append(_next(next_steps(found, given, command), width, detail))
         between = [""] if detail.blanks else []
         lines = []
         for section in filter(None, sections):
@@ -71,8 +74,8 @@ def summary(found: Diagnosis, width: int, given: Collection[str] = ()) -> list[s
     return lines
 
 
-def next_steps(found: Diagnosis, given: Collection[str] = ()) -> list[str]:
-    """Return what to do with a diagnosis, in sentences; nothing of options that were ``given``."""
+def next_steps(found: Diagnosis, given: Collection[str] = (), command: str = "") -> list[str]:
+    """Return what to do with a diagnosis, in sentences: no option that was ``given``, options of ``command``."""
     out = [] if found.next_experiment is None else [found.next_experiment]
     offers = {
         "--next-experiment": "--next-experiment FOLDER designs the motions that tell the causes apart.",
@@ -87,11 +90,11 @@ def next_steps(found: Diagnosis, given: Collection[str] = ()) -> list[str]:
         limits = ["--verbose lists the smallest effects that these logs would show."]
         return [*out, "Nothing to correct.", *(limits if found.detection_limits else [])]
     told = [text for option, text in offers.items() if option not in given]
-    if found.verdict == "explained" and not told:
-        told = ["Diagnose again with the model that was written: the verdict should be none."]
-    if found.verdict == "unknown":
+    if found.verdict == "explained" and "--write-model" in given:
+        told.append("Diagnose again with the model that was written: the verdict should be none.")
+    if found.verdict in ("unknown", "undecidable"):
         told.append("--explain says what was tried.")
-    return [*out, *told]
+    return [*out, *(f"{command} {text}".strip() for text in told)]
 
 
 def _can_be_designed(found: Diagnosis) -> bool:
@@ -214,9 +217,9 @@ _SECTIONS: tuple[Callable[[Diagnosis, int, _Detail], list[str]], ...] = (
 )
 
 
-def _next(found: Diagnosis, given: Collection[str], width: int, detail: _Detail) -> list[str]:
+def _next(steps: Sequence[str], width: int, detail: _Detail) -> list[str]:
     """Return the next steps, a line each where there is room."""
-    steps = next_steps(found, given)[: detail.steps]
+    steps = steps[: detail.steps]
     if not detail.blanks:
         return _folded(f"next: {' '.join(steps)}", width)
     out = []

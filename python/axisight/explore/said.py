@@ -114,7 +114,7 @@ def said(document: Any, source: str = "verdict") -> Said:
     try:
         read = _Verdict.model_validate(document)
     except ValidationError as error:
-        raise InputError(f"{source}: {describe_validation(error)}") from error
+        raise InputError(f"{source}: {describe_validation(error, _Verdict)}") from error
     axes = read.gap.per_axis
     return Said(
         read.verdict,

@@ -60,7 +60,7 @@ class Case:
     roles: tuple[Role, ...]
 
     def _repr_html_(self) -> str:
-        """What each log is for, for notebooks."""
+        """Return a table of the logs and their roles as HTML, for notebooks."""
         rows = [
             (
                 log.name,
@@ -101,15 +101,16 @@ def read_case(
 ) -> Case:
     """Read `case.toml` in `folder` and every log it lists; `columns` is for non-native logs.
 
-    `columns`, `max_bytes`, which holds for each log, and `currents` are what `read_log` takes. Raises CaseError naming
-    file and field: case.toml missing or invalid, unknown keys, no estimation log, robot file missing, one
-    file listed twice, logs with different numbers of axes, a period that is not a whole number of samples
-    or is longer than the log. Raises LogError for a log that cannot be read or has another sample rate.
+    `columns`, `max_bytes` and `currents` are as in `read_log`; `max_bytes` holds for each log separately.
+    ``untrusted``: refuse everything that leads out of the folder, for cases from strangers. These are
+    absolute names, names with ``..``, links that lead out, and HDF5 files that refer to other files.
+    ``load``: function that returns the robot for the path in the case. Its gear ratios convert joint-side
+    signals, its torque constants convert currents.
 
-    ``untrusted``: a case of somebody else. Nothing outside the folder is opened: names that are absolute
-    or have ``..``, links that lead out, and HDF5 files that name others are refused.
-    ``load`` makes of the robot's path the robot by whose gears signals of joints are read, and currents by its
-    torque constants.
+    Raises CaseError naming file and field: case.toml missing or invalid, unknown keys, no estimation log,
+    robot file missing, one file listed twice, logs with different numbers of axes, a period that is not a
+    whole number of samples or is longer than the log. Raises LogError for a log that cannot be read or has
+    another sample rate.
     """
     folder = usable_path(folder, CaseError)
     path = folder / "case.toml"
@@ -136,7 +137,7 @@ def read_case(
             )
         seen.add(file)
     given = load_column_map(columns) if isinstance(columns, str | Path) else columns
-    # Logs of motors are read without the robot, which may be a file that only later is looked at.
+    # Motor-side logs need no robot, so a faulty robot file is not reported here but where it is used.
     needed = given is not None and needs_robot(given)
     recorded = any(
         is_bag(folder / entry.file) or is_folder_log(folder / entry.file) for entry in content.log
@@ -158,7 +159,7 @@ def read_case(
 
 
 def _check_names(path: Path, content: _CaseFile) -> None:
-    """Raise CaseError or LogError for what leads out of the folder of a case; see `untrusted`."""
+    """Raise CaseError or LogError for names that lead out of the case folder (`untrusted` in `read_case`)."""
     check_name(content.robot, f"{path}: robot")
     for number, entry in enumerate(content.log):
         check_name(entry.file, f"{path}: log {number + 1}: file")
@@ -171,7 +172,7 @@ def _parse(path: Path) -> _CaseFile:
     except (OSError, UnicodeDecodeError) as error:
         raise CaseError(f"{path}: cannot be read: {error}") from error
     except ValidationError as error:
-        raise CaseError(f"{path}: {describe_validation(error)}") from error
+        raise CaseError(f"{path}: {describe_validation(error, _CaseFile)}") from error
     except ValueError as error:
         raise CaseError(f"{path}: expected TOML, got: {error}") from error
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from difflib import get_close_matches
+from collections.abc import Iterable, Sequence
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
-from axisight.arguments import short, shown
+from axisight.arguments import did_you_mean, short, shown
 from axisight.logs.units import (
     PRISMATIC_UNITS,
     REVOLUTE_UNITS,
@@ -25,9 +24,9 @@ Text = Annotated[str, Field(min_length=1)]
 
 
 UNKNOWN = "unknown"
-"""Scale of a current whose torque constant nobody knows."""
+"""Scale of a current whose torque constant is unknown."""
 
-# Faults of one file that a message tells.
+# A message lists at most this many faults of one file.
 _SHOWN = 8
 
 
@@ -36,13 +35,13 @@ class _Strict(BaseModel):
 
 
 class Address(_Strict):
-    """Where one signal is kept.
+    """The place of one signal in a file.
 
     `name` is a column of a table or a variable of a MAT, HDF5 or NPZ file; fields of structs and
-    members of groups follow after dots (`rec.meas.q`). `index` picks from a matrix in NumPy order
+    members of groups follow after dots (`rec.meas.q`). `index` selects from a matrix in NumPy order
     and counts from 0: "1,:" is the second row, ":,2" the third column, a lone integer the entry of
     the first dimension. `file` names another file in the log's folder that holds this signal. `note`
-    is said of every log that is read by it.
+    is added to the notes of every log that is read with this address.
     """
 
     name: Text
@@ -60,10 +59,10 @@ class Address(_Strict):
 
 
 class TimeColumn(Address):
-    """Time stamps; `resample_hz` interpolates irregular ones linearly onto a uniform grid.
+    """Time stamps; `resample_hz` (Hz) interpolates irregular ones linearly onto a uniform grid.
 
-    "mean" is the mean rate of the stamps, for logs whose rate nobody knows beforehand; stamps that are
-    uniform stay as they are.
+    `resample_hz = "mean"` takes the mean rate of the stamps, for logs whose rate is not known beforehand;
+    uniform stamps are then not resampled.
 
     Resampling is for logs stamped by a host computer. It has no anti-alias filter and bridges gaps
     by straight lines; the log's notes say so.
@@ -89,13 +88,13 @@ class _Signal(Address):
 
 
 class PositionColumn(_Signal):
-    """Position: SI value = sign * scale * value * unit factor. `scale` may name a file scalar."""
+    """Position: SI value = sign * scale * value * unit factor. `scale` may name a scalar in the file."""
 
     unit: PositionUnit
 
 
 class VelocityColumn(_Signal):
-    """Velocity, measured or reference."""
+    """Velocity, measured or reference; scaled as `PositionColumn`."""
 
     unit: VelocityUnit
 
@@ -103,8 +102,8 @@ class VelocityColumn(_Signal):
 class TorqueColumn(_Signal):
     """Torque or force; for A and V, `scale` states Nm (or N) per A or V.
 
-    A without one is a current of the motor, which is read with a robot that states its torque constant; with
-    "unknown" it is one whose constant nobody knows, for a diagnosis to find.
+    Without a scale, A is a motor current: `read_log` then needs a robot that states its torque constant. With
+    `scale = "unknown"`, a diagnosis finds the constant.
     """
 
     unit: TorqueUnit
@@ -117,17 +116,17 @@ class TorqueColumn(_Signal):
 
     @property
     def is_current(self) -> bool:
-        """Whether it is a current of the motor, which its torque constant turns into torque."""
+        """Whether the signal is a motor current that the torque constant of the motor turns into torque."""
         return self.unit == "A" and (self.scale is None or self.is_unknown)
 
     @property
     def is_unknown(self) -> bool:
-        """Whether nobody knows the torque constant of the motor."""
+        """Whether the signal is a motor current with an unknown torque constant."""
         return self.unit == "A" and self.scale == UNKNOWN
 
 
 class TemperatureColumn(_Signal):
-    """Temperature."""
+    """Temperature, in degC or K."""
 
     unit: TemperatureUnit = "degC"
 
@@ -135,7 +134,7 @@ class TemperatureColumn(_Signal):
 class AxisColumns(_Strict):
     """The signals of one driven axis.
 
-    A log is read only where all axes have a torque, or targets of their positions; a check needs neither.
+    `read_log` requires that all axes have a torque, or that all have `position_ref`; `check_log` does not.
     """
 
     position: PositionColumn
@@ -165,12 +164,13 @@ class AxisColumns(_Strict):
 
 
 class CsvOptions(_Strict):
-    """How a CSV file is written; without a header, columns are named "0", "1" and so on.
+    r"""The format of a CSV file; without a header, columns are named "0", "1" and so on.
 
-    `separator` is one character, or "auto" for what stands between the names of the header.
+    `separator` is one character, `\s+` for white space, or "auto". "auto" takes tab, semicolon or comma, the
+    first of them that the header contains, and a space if it contains none.
     """
 
-    # One character: pandas would take more for a pattern, which may take any time to search for.
+    # One character: pandas takes longer text as a pattern, and a hostile pattern can take forever to match.
     separator: Annotated[str, Field(pattern=r"^(auto|.|\\s\+)$")] = ","
     decimal: Annotated[str, Field(min_length=1, max_length=1)] = "."
     header: bool = True
@@ -178,10 +178,11 @@ class CsvOptions(_Strict):
 
 
 class ColumnMap(_Strict):
-    """A whole map. `sample_rate_hz` is a number, or the name of a scalar in the file.
+    """A column map for a fixed number of axes, in the order of the axes.
 
-    `side` says whether positions, velocities and torques are those of motors or of joints; those of joints
-    become the motors' by the gear ratios of the robot that the log is read for.
+    `sample_rate_hz` (Hz) is a number, or the name of a scalar in the file. `side` says whether positions,
+    velocities and torques are motor-side or joint-side. The gear ratios of the robot convert joint-side
+    signals to the motor side.
     """
 
     schema_: Literal["axisight.columns/1"] = Field(default="axisight.columns/1", alias="schema")
@@ -198,13 +199,14 @@ class ColumnMap(_Strict):
         return self
 
 
-def describe_validation(error: ValidationError) -> str:
-    """Return pydantic's findings as "field: expected ..., got ...", joined by semicolons.
+def describe_validation(error: ValidationError, model: type[BaseModel]) -> str:
+    """Return the errors of pydantic as "field: expected ..., got ...", joined by semicolons.
 
-    Entries of lists count from 1: "axis 2: torque.unit".
+    Entries of lists count from 1: "axis 2: torque.unit". A key that ``model`` and its parts do not have is
+    named with the nearest one that they have.
     """
     items = error.errors()
-    # A list whose entries are wrong counts as empty too: that is no fault of its own.
+    # pydantic also reports a list with wrong entries as too short: that is not a second fault.
     inner = [item["loc"] for item in items]
     items = [
         item
@@ -215,13 +217,14 @@ def describe_validation(error: ValidationError) -> str:
         )
     ]
     missing = [item["loc"] for item in items if item["type"] == "missing"]
-    parts = [f"{_place(item['loc'])}: {_fault(item, missing)}" for item in items[:_SHOWN]]
+    known = _keys(model)
+    parts = [f"{_place(item['loc'])}: {_fault(item, missing, known)}" for item in items[:_SHOWN]]
     more = [f"and {len(items) - _SHOWN} more"] if len(items) > _SHOWN else []
     return "; ".join([*parts, *more])
 
 
 def _place(keys: tuple[int | str, ...]) -> str:
-    """Return the place of a key: names with dots between, entries of lists by number."""
+    """Return the path of a key: names joined by dots, list entries by number."""
     text = ""
     for key in keys:
         if isinstance(key, int):
@@ -231,16 +234,17 @@ def _place(keys: tuple[int | str, ...]) -> str:
     return text.removesuffix(":") or "(whole file)"
 
 
-def _fault(item: ErrorDetails, missing: Sequence[tuple[int | str, ...]]) -> str:
-    """Return what is wrong with one key, and what was meant; ``missing``: keys that are not there."""
+def _fault(
+    item: ErrorDetails, missing: Sequence[tuple[int | str, ...]], known: Iterable[str]
+) -> str:
+    """Return what is wrong with a key, with a guess at the key meant; ``missing``: paths of missing keys."""
     kind, got = item["type"], shown(item["input"])
     if kind == "missing":
         return "expected this key, got none"
     if kind == "extra_forbidden":
         *parent, key = item["loc"]
         beside = [str(at[-1]) for at in missing if list(at[:-1]) == parent]
-        near = get_close_matches(str(key), [*beside, *_keys()], n=1, cutoff=0.7)
-        meant = f". Did you mean {near[0]!r}?" if near else ""
+        meant = did_you_mean(str(key), beside) or did_you_mean(str(key), known)
         return f"expected a known key, got an unknown one{meant}"
     if kind == "literal_error":
         expected = str(item["ctx"]["expected"]).replace("'", "").replace(" or ", ", ")
@@ -261,7 +265,7 @@ _BEGINNINGS = {
     "List should ": "expected a list to ",
 }
 
-# Units that people write: the unit that is known, and the factor that goes into `scale`.
+# Unsupported units that people write -> (supported unit, factor that goes into `scale`)
 _OTHER_UNITS = {
     "kNm": ("Nm", 1e3),
     "mNm": ("Nm", 1e-3),
@@ -284,7 +288,7 @@ _OTHER_UNITS = {
 
 
 def as_unit(given: object) -> str:
-    """Return how a unit that is not known is written; empty for what is none."""
+    """Return a question that proposes the supported unit and scale for ``given``; "" if none is known."""
     if not isinstance(given, str) or given not in _OTHER_UNITS:
         return ""
     unit, factor = _OTHER_UNITS[given]
@@ -292,14 +296,8 @@ def as_unit(given: object) -> str:
     return f". Did you mean unit = {unit!r}{scale}?"
 
 
-def _keys() -> set[str]:
-    """Return the keys of all tables of a column map."""
-    tables: set[type[_Strict]] = {
-        ColumnMap,
-        AxisColumns,
-        CsvOptions,
-        TimeColumn,
-        PositionColumn,
-        TorqueColumn,
-    }
-    return {field.alias or name for table in tables for name, field in table.model_fields.items()}
+def _keys(model: type[BaseModel]) -> list[str]:
+    """Return the keys of a document of a model, and of all its parts."""
+    schema = model.model_json_schema()
+    parts = [schema, *schema.get("$defs", {}).values()]
+    return [key for part in parts for key in part.get("properties", ())]

@@ -26,7 +26,7 @@ def parse_column_map(text: str, where: str = "column map") -> AnyMap:
         kind = ColumnPattern if "every_axis" in content else ColumnMap
         return kind.model_validate(content)
     except ValidationError as error:
-        raise LogError(f"{where}: {describe_validation(error)}") from error
+        raise LogError(f"{where}: {describe_validation(error, ColumnMap)}") from error
     except ValueError as error:
         raise LogError(f"{where}: expected TOML, got: {error}") from error
 

@@ -92,4 +92,4 @@ def _info(path: Path) -> _Info:
     except (OSError, UnicodeDecodeError) as error:
         raise LogError(f"{path}: cannot be read: {error}") from error
     except ValidationError as error:
-        raise LogError(f"{path}: {describe_validation(error)}") from error
+        raise LogError(f"{path}: {describe_validation(error, _Info)}") from error

@@ -379,7 +379,7 @@ def _map_of(found: _Found, name: str, step: float | None, robot: Robot | None) -
     try:
         return ColumnMap.model_validate(given)
     except ValidationError as error:
-        raise LogError(f"{name}: {describe_validation(error)}") from error
+        raise LogError(f"{name}: {describe_validation(error, ColumnMap)}") from error
 
 
 def _attributes(table: object, name: str) -> dict[str, Any]:

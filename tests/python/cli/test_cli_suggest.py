@@ -6,10 +6,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
 from axisight.cli import app
-from axisight.cli.identify_common import option_words
+from axisight.cli.identify_common import option_names, option_words
 from axisight.cli.robot import axis_of
 from axisight.cli.suggest import suggestion
 from axisight.errors import InputError, LogError
@@ -138,11 +139,22 @@ def test_errors_of_identification_name_options():
     text = (
         'cutoff_hz: expected 1; or fix some with `known`, or use deficient="group" or method="wls"'
     )
-    words = option_words(text, {"cutoff_hz": 1.0, "method": "ls", "known": None})
+    words = option_words(text, ["cutoff_hz", "method", "known"])
     assert (
         words == "--cutoff-hz: expected 1; or fix some with --known, or use --group or --method wls"
     )
-    assert option_words('x: use method="wls"', {}) == 'x: use method="wls"'
+    assert option_words('x: use method="wls"', []) == 'x: use method="wls"'
+
+
+def test_arguments_of_a_command_have_no_dashes():
+    def identify(logs: list[Path], gear_ratio: float = 1.0) -> None: ...
+
+    one = typer.Typer()
+    one.command()(identify)
+    names = option_names(typer.Context(typer.main.get_command(one)))
+    assert "gear_ratio" in names
+    assert "logs" not in names
+    assert option_words("logs: expected two", names) == "logs: expected two"
 
 
 @pytest.mark.parametrize(

@@ -100,6 +100,7 @@ def test_a_screen_is_as_stored(name):
 def test_what_a_screen_may_hold(name, width):
     lines = summary(SITUATIONS[name], width)
     assert max(map(len, lines)) <= width
+    assert len(lines) <= MOST_LINES
     text = "\n".join(lines)
     for word in (
         "null",
@@ -124,6 +125,18 @@ def test_files_that_are_written_take_lines_and_are_not_offered():
         "Diagnose again with the model that was written: the verdict should be none."
     ]
     assert "--report" in " ".join(next_steps(explained(), ["--json"]))
+    assert "Diagnose again" not in " ".join(next_steps(explained(), ["--report"]))
+
+
+def test_every_verdict_but_none_has_a_next_step():
+    for found in SITUATIONS.values():
+        steps = next_steps(replace(found, next_experiment=None), ["--report", "--next-experiment"])
+        assert steps, found.verdict
+
+
+def test_another_command_stands_before_its_options():
+    (step,) = next_steps(explained(), ["--report"], "axisight diagnose demo/case")
+    assert step.startswith("axisight diagnose demo/case --write-model FILE writes")
 
 
 def test_an_experiment_is_offered_where_one_can_be_designed():
