@@ -7,13 +7,13 @@ from typing import Any
 
 import lazy_loader
 
-# What there is stands in `__init__.pyi`; some of it has slow imports of its own.
+# `__init__.pyi` lists the public names; they load on first use, as some import slowly.
 _loaded, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         return import_module("axisight._core").__version__
-    if name == "reproduce":  # an installation of its own, see thesis/
+    if name == "reproduce":  # a separate distribution, see thesis/
         return import_module("axisight_thesis")
     return _loaded(name)

@@ -1,4 +1,7 @@
-"""Checks of arguments: what is wrong is named, whatever its type; nothing is guessed."""
+"""Check arguments of any type: return the checked value, or raise InputError that names the field.
+
+In every function here, ``field`` is the name of the argument in messages.
+"""
 
 from __future__ import annotations
 
@@ -19,16 +22,16 @@ Lines = NDArray[np.int64]
 T = TypeVar("T")
 
 _MOST_THREADS = 1024
-# Bytes of a name, and of a whole path, that file systems take.
+# Longest name and whole path that file systems accept, in bytes.
 _LONGEST_NAME = 255
 _LONGEST_PATH = 4000
-# Longer texts are no typing errors of a name.
+# Longer text is not a typing error of a name.
 _LONGEST_WORD = 100
 _ALIKE = 0.7
 
 
 def short(text: str, most: int = 80) -> str:
-    """Return a text for a message, cut where it is longer than ``most`` characters."""
+    """Return a text for a message, cut to ``most`` characters."""
     return text if len(text) <= most else text[: most - 3] + "..."
 
 
@@ -38,10 +41,10 @@ def counted(number: int, one: str, many: str = "") -> str:
 
 
 def shown(value: object) -> str:
-    """Return a value for a message, cut where it is long."""
+    """Return a value as text for a message, cut to 80 characters."""
     if isinstance(value, np.ndarray) and value.ndim:
         return f"an array of {value.dtype} with shape {value.shape}"
-    if isinstance(value, str):  # cut first: the text may be that of a whole file
+    if isinstance(value, str):  # cut before repr, because it may be the text of a whole file
         return short(repr(value[:100]))
     try:
         text = str(value) if isinstance(value, (int, float, np.number)) else repr(value)
@@ -51,9 +54,9 @@ def shown(value: object) -> str:
 
 
 def nearest(value: object, known: Iterable[str]) -> str | None:
-    """Return the known word that a text was meant to be; None where no word is near.
+    """Return the known word that a text probably means; None if no word is near.
 
-    Case, spaces and dashes do not count. The start of exactly one known word stands for that word.
+    Case, spaces and dashes do not count. The start of exactly one known word means that word.
     """
     if not isinstance(value, str) or not 0 < len(value) <= _LONGEST_WORD:
         return None
@@ -70,13 +73,13 @@ def _plain(word: str) -> str:
 
 
 def did_you_mean(value: object, known: Iterable[str]) -> str:
-    """Return ``. Did you mean 'word'?`` for the end of a message; nothing where no known word is near."""
+    """Return ``. Did you mean 'word'?`` for the end of a message; "" if no known word is near."""
     near = nearest(value, known)
     return "" if near is None else f". Did you mean {near!r}?"
 
 
 def _array(value: object, kinds: str) -> NDArray[Any] | None:
-    """Return an array of one of these kinds of numbers, or None."""
+    """Return a value as an array if its dtype kind is in ``kinds`` (or it is empty), else None."""
     try:
         array = np.asarray(value)
     except (TypeError, ValueError, OverflowError):  # lists of unequal lengths, strange objects
@@ -85,12 +88,12 @@ def _array(value: object, kinds: str) -> NDArray[Any] | None:
 
 
 def real_array(value: object) -> NDArray[Any] | None:
-    """Return an array of real numbers of any shape, or None."""
+    """Return a value as an array of real numbers of any shape, or None if it is none."""
     return _array(value, "biuf")
 
 
 def complex_array(field: str, value: object) -> Complex:
-    """Return complex numbers of any shape, finite or not."""
+    """Return complex numbers of any shape, finite or not; raise InputError for anything else."""
     array = _array(value, "biufc")
     if array is None:
         raise InputError(f"{field}: expected complex numbers, got {shown(value)}")
@@ -98,7 +101,7 @@ def complex_array(field: str, value: object) -> Complex:
 
 
 def number(field: str, value: object, what: str = "a finite number") -> float:
-    """Return a finite number."""
+    """Return a finite number; raise InputError, which expects ``what``, for anything else."""
     array = _array(value, "iuf")
     if array is None or array.ndim or not np.isfinite(array):
         raise InputError(f"{field}: expected {what}, got {shown(value)}")
@@ -106,7 +109,7 @@ def number(field: str, value: object, what: str = "a finite number") -> float:
 
 
 def positive(field: str, value: object) -> float:
-    """Return a positive finite number."""
+    """Return a positive finite number; raise InputError for anything else."""
     what = "a positive number"
     if not (found := number(field, value, what)) > 0:
         raise InputError(f"{field}: expected {what}, got {shown(value)}")
@@ -114,7 +117,7 @@ def positive(field: str, value: object) -> float:
 
 
 def not_negative(field: str, value: object) -> float:
-    """Return a finite number from zero on."""
+    """Return a finite number that is not negative; raise InputError for anything else."""
     what = "a number not below zero"
     if not (found := number(field, value, what)) >= 0:
         raise InputError(f"{field}: expected {what}, got {shown(value)}")
@@ -122,7 +125,7 @@ def not_negative(field: str, value: object) -> float:
 
 
 def between(field: str, value: object, low: float, high: float) -> float:
-    """Return a number between ``low`` and ``high``, neither included."""
+    """Return a number between ``low`` and ``high``, both excluded; raise InputError for anything else."""
     what = f"a number between {low:g} and {high:g}"
     if not low < (found := number(field, value, what)) < high:
         raise InputError(f"{field}: expected {what}, got {shown(value)}")
@@ -130,7 +133,7 @@ def between(field: str, value: object, low: float, high: float) -> float:
 
 
 def whole(field: str, value: object, least: int = 1, most: int = 2**31 - 1) -> int:
-    """Return a whole number from ``least`` to ``most``."""
+    """Return a whole number from ``least`` to ``most``; raise InputError for anything else."""
     array = _array(value, "iuf")
     if (
         array is None
@@ -145,7 +148,7 @@ def whole(field: str, value: object, least: int = 1, most: int = 2**31 - 1) -> i
 
 
 def seed_of(field: str, seed: object) -> int:
-    """Return a seed or the number of a run."""
+    """Return a seed or run number, 0 to 2^64 - 1; raise InputError for anything else."""
     array = _array(seed, "iu")
     if array is None or array.ndim or not 0 <= int(array) < 1 << 64:
         raise InputError(f"{field}: expected a whole number, 0 to 2^64 - 1, got {shown(seed)}")
@@ -153,19 +156,19 @@ def seed_of(field: str, seed: object) -> int:
 
 
 def threads_of(value: object) -> int:
-    """Return a number of threads; 0 stands for every core."""
+    """Return a number of threads, 0 to 1024, where 0 means every core; raise InputError for anything else."""
     return whole("threads", value, 0, _MOST_THREADS)
 
 
 def switch(field: str, value: object) -> bool:
-    """Return True or False."""
+    """Return a bool; raise InputError for anything else, numbers included."""
     if not isinstance(value, bool | np.bool_):
         raise InputError(f"{field}: expected True or False, got {shown(value)}")
     return bool(value)
 
 
 def one_of(field: str, value: object, known: Iterable[str]) -> str:
-    """Return one of the known words."""
+    """Return one of the known words; raise InputError, with the nearest word, for anything else."""
     names = list(known)
     if not isinstance(value, str) or value not in names:
         meant = did_you_mean(value, names)
@@ -174,14 +177,14 @@ def one_of(field: str, value: object, known: Iterable[str]) -> str:
 
 
 def words(field: str, value: object) -> str:
-    """Return text."""
+    """Return a text; raise InputError for anything else."""
     if not isinstance(value, str):
         raise InputError(f"{field}: expected text, got {shown(value)}")
     return value
 
 
 def instance(field: str, value: object, *kinds: type[T]) -> T:
-    """Return an object of one of these types."""
+    """Return an object of one of these types; raise InputError for any other."""
     if not isinstance(value, kinds):
         expected = " or ".join(kind.__name__ for kind in kinds)
         raise InputError(f"{field}: expected {expected}, got {type(value).__name__}")
@@ -189,16 +192,16 @@ def instance(field: str, value: object, *kinds: type[T]) -> T:
 
 
 def path_of(field: str, value: object) -> Path:
-    """Return a path."""
+    """Return a path; raise InputError for other types and for paths that no file can have."""
     if not isinstance(value, str | PathLike):
         raise InputError(f"{field}: expected a path, got {shown(value)}")
     return usable_path(value, InputError, field)
 
 
 def usable_path(path: str | PathLike[str], kind: type[InputError], field: str = "") -> Path:
-    """Return a path; raises an error of ``kind`` for one that no file can have.
+    """Return a path; raise an error of ``kind`` for one that no file can have.
 
-    Asked about such names, the system raises instead of saying that there is no such file.
+    For such names the system raises ValueError or OSError instead of reporting a missing file.
     """
     path, where = Path(path), f"{field}: " if field else ""
     if "\0" in str(path):
@@ -213,21 +216,25 @@ def _bytes(path: str | Path) -> int:
 
 
 def several(field: str, value: object) -> list[Any]:
-    """Return the items of a list, tuple or array."""
+    """Return the items of an iterable as a list; raise InputError for text and for anything else."""
     if isinstance(value, str | bytes) or not isinstance(value, Iterable):
         raise InputError(f"{field}: expected a list, got {shown(value)}")
     return list(value)
 
 
 def reals(field: str, value: object, what: str, ndim: int | tuple[int, ...]) -> Real:
-    """Return finite numbers (a copy only where needed); none of the axes is empty."""
+    """Return finite real numbers as float64, copied only if needed.
+
+    Raises InputError, which expects ``what``, for other values, for another number of dimensions than
+    ``ndim``, and for an empty dimension.
+    """
     array = _array(value, "biuf")
     _expect(field, value, array, what, ndim)
     return np.asarray(array, dtype=np.float64)
 
 
 def complexes(field: str, value: object, what: str, ndim: int | tuple[int, ...]) -> Complex:
-    """Return finite complex numbers (a copy only where needed); none of the axes is empty."""
+    """Return finite complex numbers; dimensions, copies and errors are as in `reals`."""
     array = _array(value, "biufc")
     _expect(field, value, array, what, ndim)
     return np.asarray(array, dtype=np.complex128)
@@ -248,7 +255,10 @@ def _expect(
 
 
 def lines_below(field: str, value: object, n_samples: int) -> Lines:
-    """Return ascending lines from 1 to below the Nyquist line of ``n_samples``; may be none."""
+    """Return ascending lines from 1 to below the Nyquist line of ``n_samples``, possibly none.
+
+    Raises InputError for other numbers, other orders and repetitions.
+    """
     array = _array(value, "iuf")
     if (
         array is None
@@ -269,7 +279,10 @@ def lines_below(field: str, value: object, n_samples: int) -> Lines:
 
 
 def series_pair(first: str, a: object, second: str, b: object) -> tuple[Real, Real]:
-    """Return two series of finite real numbers of one length, (n,) each, by their field names."""
+    """Return two series (n,) of finite real numbers; raise InputError unless their lengths are equal.
+
+    ``first`` and ``second`` are the field names of ``a`` and ``b`` in messages.
+    """
     found = []
     for field, value in ((first, a), (second, b)):
         array = np.asarray(value)

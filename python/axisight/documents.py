@@ -1,4 +1,4 @@
-"""TOML and JSON written by strangers: nested, long and huge ones are refused, never followed."""
+"""Read TOML and JSON from strangers, and refuse documents that are too long or too deeply nested."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from axisight.arguments import short
 
 _LONGEST = 32 * 2**20
 _MOST_PARTS = 32
-# Keys of many parts cost the square of their number, or worse: a key part, a dot, and so on.
+# Parsing a dotted key takes time that grows at least with the square of its number of parts.
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
 _DOTTED = re.compile(rf"(?<![\w-])(?:{_PART}){{{_MOST_PARTS}}}")
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a document; raises OSError for one that is too long, as a device may be without end."""
+    """Return the text of a document; raise OSError if it is too long, as a device may never end."""
     with path.open(encoding="utf-8") as file:
         text = file.read(_LONGEST + 1)
     if len(text) > _LONGEST:
@@ -29,7 +29,7 @@ def read_text(path: Path) -> str:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Return the content of a TOML document; raises ValueError, whose message is short, for any other."""
+    """Return the content of a TOML document; raise ValueError with a short message for any other text."""
     if len(text) > _LONGEST:
         raise ValueError(f"expected at most {_LONGEST} characters, got {len(text)}")
     if found := _DOTTED.search(text):
@@ -40,12 +40,12 @@ def parse_toml(text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError:
         raise ValueError("expected values in fewer brackets, got some nested too deep") from None
-    except ValueError as error:  # that of tomllib, and of int() for thousands of digits
+    except ValueError as error:  # from tomllib, and from int() for thousands of digits
         raise ValueError(_cut(str(error))) from None
 
 
 def parse_json(text: str) -> Any:
-    """Return the content of a JSON document; raises ValueError, whose message is short, for any other."""
+    """Return the content of a JSON document; raise ValueError with a short message for any other text."""
     try:
         return json.loads(text)
     except RecursionError:
@@ -55,12 +55,12 @@ def parse_json(text: str) -> Any:
 
 
 def _cut(said: str) -> str:
-    """Cut the middle of what a parser says: where it was stands at the end."""
+    """Return a parser's message with its middle cut out, because the place of the fault is at the end."""
     return said if len(said) <= 200 else f"{said[:80]} ... {said[-60:]}"
 
 
 def finite(value: Any) -> Any:
-    """Return a document with None in place of numbers that JSON does not have."""
+    """Return a document with None in place of NaN and infinities, which JSON cannot express."""
     if isinstance(value, dict):
         return {key: finite(v) for key, v in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""Files written whole or not at all, and the one law of where they may be written, tried before the work."""
+"""Write files whole or not at all, and check before the work that they can be written."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ _KINDS = {
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write ``text`` as `write_bytes`."""
+    """Write ``text`` in UTF-8; otherwise as `write_bytes`."""
     write_bytes(path, text.encode("utf-8"))
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write ``data`` beside ``path`` and rename it, so no half file is ever left.
+    """Write ``data`` to a file beside ``path`` and rename it, so that no partial file remains.
 
-    A link is followed, a file keeps its permissions, a new one has those that the umask leaves. Raises
-    OutputError for anything but a file in the way, and for what the disk refuses.
+    Links are followed. An existing file keeps its permissions; a new one gets those of the umask. Raises
+    OutputError if ``path`` exists but is not a file, and if the system refuses to write.
     """
     target = _followed(path)
     try:
         before = _in_the_way(target, path)
         target.parent.mkdir(parents=True, exist_ok=True)
-        # Short, for the name of the file may be as long as names can be.
+        # A name of its own: the target's name may already have the longest length allowed.
         beside = target.parent / f".{secrets.token_hex(8)}.part"
-        # Not `tempfile`, whose files nobody else may read, whatever the umask says.
+        # Not `tempfile`, which ignores the umask and makes files that only the owner can read.
         handle = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
         try:
             with os.fdopen(handle, "wb") as file:
@@ -61,12 +61,18 @@ def check_targets(
     replaces: Mapping[str, Sequence[str]] | None = None,
     force: bool = False,
 ) -> None:
-    """Raise OutputError, naming the option, for outputs of a command that could not be written after its work.
+    """Raise OutputError, naming the option, if a command could not write one of its outputs.
 
-    ``targets``: by option, None where it was not given; no two may be one file. ``inputs`` as in `check_target`.
-    ``replaces``: by option, how files end that are earlier results of it; other files are replaced with
-    ``force`` only, and what people work on, a model or a map, has none that are. Options that are not in it have
-    names, or endings, that are the command's own.
+    targets
+        Output files by option, None for options not given. No two may be the same file.
+    inputs
+        Files that the command reads, see `check_target`.
+    replaces
+        Suffixes, by option, of earlier results that may be replaced. Other existing files need ``force``. An
+        empty list protects every existing file, as for models and maps. Options that are missing here may
+        always replace their files, because the command itself chose the names.
+    force
+        Whether to allow replacing any file.
     """
     read = list(inputs)
     seen: dict[Path, str] = {}
@@ -89,7 +95,7 @@ def check_targets(
 
 
 def _check_replaced(target: Path, endings: Sequence[str]) -> None:
-    """Raise OutputError for a file that is there and does not end as a result that may be made anew."""
+    """Raise OutputError for an existing file whose suffix is not among ``endings``."""
     path = _followed(target)
     if path.is_file() and path.suffix.lower() not in endings:
         kind = f" and is no {' or '.join(endings)}" if endings else ""
@@ -99,10 +105,10 @@ def _check_replaced(target: Path, endings: Sequence[str]) -> None:
 def check_target(
     target: Path | str, *, inputs: Iterable[Path] = (), overwrite: bool = True
 ) -> None:
-    """Raise OutputError for a file that could not be written.
+    """Raise OutputError if ``target`` could not be written.
 
-    ``target`` is a file or nothing yet, none of the ``inputs`` by whatever name, in a folder that can be written
-    to or made. Without ``overwrite`` there must be nothing.
+    ``target`` must be a writable file or not exist, in a folder that is writable or can be made. It must not
+    be one of the ``inputs``, even under another name. Without ``overwrite`` it must not exist.
     """
     path = _followed(target)
     try:
@@ -124,7 +130,7 @@ def check_target(
 
 
 def check_folder(folder: Path | str) -> None:
-    """Raise OutputError for a folder that is none, or that could not be made or written to."""
+    """Raise OutputError if ``folder`` is not a folder, or could not be made or written to."""
     try:
         _try_folder(_followed(folder), folder)
     except OutputError:
@@ -134,7 +140,7 @@ def check_folder(folder: Path | str) -> None:
 
 
 def _followed(path: Path | str) -> Path:
-    """Return where a path leads; not `Path.resolve`, which raises another error for links in a circle."""
+    """Return a path with links followed, without the RuntimeError of `Path.resolve` for circular links."""
     try:
         return Path(os.path.realpath(path))
     except ValueError as error:
@@ -142,11 +148,11 @@ def _followed(path: Path | str) -> Path:
 
 
 def _in_the_way(path: Path, said: Path | str) -> os.stat_result | None:
-    """Return what is known of a file that is there, None of nothing; raises OutputError for what is no file."""
+    """Return the status of an existing file, None without one; raise OutputError for other objects."""
     try:
         there = path.stat()
     except (FileNotFoundError, NotADirectoryError):
-        # What lies above it is looked at with its folder.
+        # `_try_folder` checks the folders above.
         return None
     if not stat.S_ISREG(there.st_mode):
         kind = _KINDS.get(stat.S_IFMT(there.st_mode), "something else")
@@ -158,17 +164,17 @@ def _same(path: Path, there: os.stat_result) -> bool:
     try:
         return os.path.samestat(Path(path).stat(), there)
     except OSError:
-        # Inputs may be names of presets.
+        # An input may be the name of a preset, for which there is no file.
         return False
 
 
 def _try_folder(folder: Path, said: Path | str) -> None:
-    """Raise OSError unless files can be made in a folder, or in the nearest above it that is there."""
+    """Raise OSError unless files can be made in a folder, or in its nearest existing parent."""
     while not os.path.lexists(folder):
         folder = folder.parent
     if not folder.is_dir():
         raise OutputError(f"{said}: expected a folder to write into, got {folder}")
-    # Tried and not asked for: permissions do not say all of what a file system refuses.
+    # Try to write, because permissions do not show everything that a file system refuses.
     with tempfile.TemporaryFile(dir=folder):
         pass
 

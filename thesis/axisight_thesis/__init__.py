@@ -2,9 +2,8 @@
 
 The thesis is "On Multivariable and Nonlinear Identification of Industrial Robots".
 Every table and figure is an item: a function from a :class:`Context` to an :class:`Item`,
-registered by name (``"table-8.2"``, ``"figure-8.9"``). :func:`run` computes items and writes
-tables as CSV, figures as PDF and PNG, and the claims of the text as a computed yes or no with
-its evidence.
+registered by name (``"table-8.2"``, ``"figure-8.9"``). :func:`run` computes items. It writes tables
+as CSV, figures as PDF and PNG, and a computed verdict with evidence for each claim of the text.
 """
 
 from axisight_thesis.context import Context, context

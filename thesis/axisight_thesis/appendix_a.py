@@ -42,9 +42,9 @@ STOCHASTIC_FIGURES = {
 def stochastic_experiments(context: Context, design: Design, run: int = 0) -> Experiments:
     """Return one realization of a design with Gaussian disturbances of torque and velocity.
 
-    Both are flat up to 40 Hz, with the mean power over lines, axes and experiments that the
-    repetitive disturbances have with T1 and square wave; independent between axes and
-    experiments and of the excitation. They repeat with the period: no leakage.
+    Both are flat up to 40 Hz. Their mean power over lines, axes and experiments is that of the
+    repetitive disturbances with T1 and square wave. They are independent between axes and
+    experiments, and of the excitation. They repeat with the period, so there is no leakage.
     """
     key = ("appendix-a", design, run)
     return context.shared(key, lambda: _simulated(context, design, run))
@@ -63,7 +63,7 @@ def _simulated(context: Context, design: Design, run: int) -> Experiments:
     velocity = _low_pass(rng, frequency, refs.shape, like.output_disturbance)
     position = velocity / (2j * np.pi * frequency)
     v_u, v_y = _signal(torque, n), _signal(position, n)
-    # Torque added to the command is what this much more reference would command.
+    # An increase of the reference by this gives the same additional torque command.
     more = _signal(torque / _reference_gain(context, frequency), n)
     run_ = simulate_batch(
         robot,

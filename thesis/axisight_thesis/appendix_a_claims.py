@@ -1,4 +1,4 @@
-"""What appendix A says, as a computed yes or no."""
+"""The claims of appendix A, with computed verdicts."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _errors(context: Context, design: Design) -> Real:
 
 
 def _nonsymmetric(context: Context) -> Result:
-    """Compare expected errors line by line: means over the band hide the difference."""
+    """Return the verdict from expected errors line by line, because means over the band hide it."""
     expected = _expected(context, _T1)
     shares, texts = [], []
     for a, b in ((0, 1), (0, 2), (1, 2)):
@@ -100,7 +100,7 @@ def _t2(context: Context) -> Result:
 
 
 def _square(context: Context) -> Result:
-    """Judge by the expected error: it has no scatter, and the effect is small."""
+    """Return the verdict from the expected error, which has no scatter, because the effect is small."""
     expected = _expected(context, _T1_SQUARE) / _expected(context, _T1)
     own = strong_square_lines(context.robot)
     others = ~square_lines(excited_lines())

@@ -43,7 +43,7 @@ Complex = NDArray[np.complex128]
 def same(context: Context) -> Complex:
     """Return estimates of experiments with the same excitation, (experiment, n_freq, 3, 3).
 
-    Averaged over four periods each; the noise differs.
+    Each is an average over four periods, with different noise.
     """
     starts = periods(1 if context.quick else PERIODS)
     return records(context, STANDARD, (0,) * repeats(context), starts).averaged()
@@ -113,10 +113,10 @@ def same_excitation(context: Context) -> Item:
 
 
 def _unsynchronized(context: Context) -> tuple[Real, Real, Real]:
-    """Return what is left of averaged spectra of two records half a period apart, odd lines.
+    """Return the effect of averaging spectra of two records half a period apart, at odd lines.
 
-    Share of the input [dB], randomness of the estimate from it, and of the average of the two
-    estimates [dB]; one each per realization.
+    The results, per realization, are the remaining share of the input, the randomness of the estimate
+    from the averaged spectra, and that of the average of both estimates, all in dB.
     """
     starts = (WAITING_S, WAITING_S + PERIOD_S / 2)
     taken = records(context, STANDARD, range(repeats(context)), starts)
@@ -130,7 +130,7 @@ def _unsynchronized(context: Context) -> tuple[Real, Real, Real]:
 
 
 def _order_matters(context: Context) -> NDArray[np.float64]:
-    """Return how far the mean of estimates and the estimate of mean spectra are apart [dB]."""
+    """Return the distance between the mean of estimates and the estimate from mean spectra [dB]."""
     taken = records(context, STANDARD, range(repeats(context)))
     u, y = taken.input[:, 0], taken.output[:, 0]
     single, together = right_divide(y, u)[0], right_divide(y.mean(axis=0), u.mean(axis=0))[0]

@@ -44,13 +44,13 @@ ODD, LOW_POWER = Design("odd"), Design("low")
 
 @item("claims-7")
 def conclusions(context: Context) -> Item:
-    """Section 7.3, statement by statement."""
+    """Return the claims of section 7.3, statement by statement."""
     claims = (*_handling(context), *_averaging(context), *_low_frequencies(context))
     return Item("claims-7", "Conclusions of section 7.3", {"": _summary(context)}, {}, claims)
 
 
 def _error(context: Context, responses: Complex, rows: NDArray[np.bool_] | None = None) -> Real:
-    """Return the error against the machine without dry friction (3, 3) [dB], mean of several."""
+    """Return the mean error relative to the machine without dry friction, (3, 3) [dB]."""
     rows = np.ones(len(LOW), bool) if rows is None else rows
     truth = linear(context)[rows]
     return np.asarray(distance_db(responses[..., rows, :, :], truth))
@@ -139,7 +139,7 @@ def _signed(values: Real) -> str:
 
 
 def _averaging(context: Context) -> tuple[Claim, ...]:
-    """Return the claims on what to average over."""
+    """Return the claims on averages over periods and realizations."""
     one = scatter_db(four_periods(context).responses()[0, 0])
     long = scatter_db(four_periods(context).averaged()[0])
     repeated = scatter_db(log_mean(same(context)))
@@ -188,7 +188,7 @@ def _averaging(context: Context) -> tuple[Claim, ...]:
 
 
 def _coupling_error(context: Context, machine: Machine) -> float:
-    """Return the error of a machine against its own linear part, coupling up to 5 Hz [dB]."""
+    """Return the error of a machine relative to its linear part, in the coupling up to 5 Hz [dB]."""
     truth = small_signal_response(context, FREQUENCY_HZ[LOW], machine=machine)
     error = distance_db(different(context, machine=machine)[:, LOW], truth)
     return middle(error.mean(axis=0), COUPLING)

@@ -17,7 +17,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 LABEL = "magnitude [rad s$^{-2}$/Nm]"
-# All responses of the chapter fit; the same for all figures, so that they can be compared.
+# Common limits, in which all responses of the chapter fit, make the figures comparable.
 _LIMITS = (0.02, 8000.0)
 
 _REFERENCE: dict[str, object] = {"color": "#b4b4b4", "lw": 2.2}
@@ -35,7 +35,7 @@ _MARKERS: dict[str, object] = {
 
 
 def reference(frequency_hz: Real, response: Complex) -> Curve:
-    """Return the response of the machine without dry friction, to be drawn below the others."""
+    """Return the curve of the machine without dry friction, which is drawn below the others."""
     return Curve(frequency_hz, np.abs(response), "without dry friction", _REFERENCE)
 
 

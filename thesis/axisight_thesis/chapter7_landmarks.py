@@ -11,7 +11,7 @@ from axisight_thesis.chapter7_sets import FREQUENCY_HZ
 
 Complex = NDArray[np.complex128]
 
-# Where the first notch and the first peak of the diagonal elements lie, with room [Hz].
+# Bands that hold the first notch and the first peak of the diagonal elements [Hz].
 NOTCH_HZ = ((3.5, 7.0), (5.0, 11.0), (5.0, 12.0))
 PEAK_HZ = ((7.0, 12.0), (10.5, 17.0), (10.5, 17.0))
 

@@ -1,7 +1,7 @@
-"""What the eye sees in the figures of chapter 7, as numbers.
+"""Numerical measures of what the figures of chapter 7 show.
 
-Responses have axes (n_freq, output, input), several of them lead with one more. Measures are
-medians over lines, which resonances and outliers do not rule, and one number per element.
+A response has axes (n_freq, output, input); several responses have one more leading axis. A measure is
+one number per element, a median over lines, on which resonances and outliers have little influence.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ DIAGONAL = np.eye(3, dtype=bool)
 COUPLING = np.array([[0, 1, 1], [1, 0, 0], [1, 0, 0]], dtype=bool)
 """Elements between axis 1 and the others."""
 LOW_HZ = 5.0
-"""Lines up to here are low frequencies: below the first notch."""
+"""Upper limit of low frequencies, below the first notch."""
 
 
 def level_db(response: Complex | Real) -> Real:
@@ -30,8 +30,8 @@ def level_db(response: Complex | Real) -> Real:
 def scatter_db(response: Complex | Real) -> Real:
     """Return the randomness from line to line, (3, 3) [dB].
 
-    Standard deviation of independent errors of neighbouring lines, from second differences
-    of the level (their variance is six times as large), by the median of their size.
+    It is the standard deviation of independent errors of neighbouring lines, from the median size of
+    second differences of the level. Second differences have six times the variance of the errors.
     """
     bends = np.diff(level_db(response), n=2, axis=-3)
     return np.asarray(np.median(np.abs(bends), axis=-3) / 0.6745 / np.sqrt(6))
@@ -43,7 +43,7 @@ def spread_db(responses: Complex) -> Real:
 
 
 def distance_db(one: Complex | Real, other: Complex | Real) -> Real:
-    """Return how far two responses are apart, (3, 3) [dB]."""
+    """Return the distance between two responses, (3, 3) [dB]."""
     return np.asarray(np.median(np.abs(level_db(one) - level_db(other)), axis=-3))
 
 
@@ -55,10 +55,11 @@ def log_mean(responses: Complex) -> Complex:
 
 
 def notch_hz(frequency_hz: Real, element: Complex, band_hz: tuple[float, float]) -> float:
-    """Return where the magnitude is lowest within a band [Hz], finer than the lines.
+    """Return the frequency of the lowest magnitude within a band [Hz], interpolated between lines.
 
-    Near a notch a response is smooth where its level is not: of a complex parabola through the
-    lines within 0.8 Hz of the lowest running mean of three levels, the smallest magnitude.
+    A complex parabola is fitted to the lines within 0.8 Hz of the lowest running mean of three levels,
+    and its smallest magnitude gives the notch. Near a notch the complex response is smooth, while its
+    level is not.
     """
     inside = (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
     f, values = frequency_hz[inside], element[inside]
@@ -72,7 +73,7 @@ def notch_hz(frequency_hz: Real, element: Complex, band_hz: tuple[float, float])
 
 
 def peak_hz(frequency_hz: Real, element: Complex, band_hz: tuple[float, float]) -> float:
-    """Return where the magnitude is highest within a band [Hz], as :func:`notch_hz`."""
+    """Return the frequency of the highest magnitude within a band [Hz], like :func:`notch_hz`."""
     return notch_hz(frequency_hz, 1 / element, band_hz)
 
 

@@ -38,10 +38,10 @@ DRIFTING = Design(drift_rad_s=np.pi / 2 / PERIOD_S)
 
 
 def waiting(context: Context) -> pd.DataFrame:
-    """Return how far estimates are from that after 5 s, per waiting time [dB].
+    """Return the distance of estimates from that after 5 s of waiting, per waiting time [dB].
 
-    Largest and middle element, at low frequencies and above, and the randomness from line to
-    line that they have anyway.
+    The columns are the distance of the largest and the median element, at low and at higher
+    frequencies, and for comparison the randomness of the estimates from line to line.
     """
     responses = records(context, STANDARD, starts_s=WAITING_TIMES_S).responses()[0]
     rows = []
@@ -126,7 +126,7 @@ def transients(context: Context) -> Item:
 
 @item("figure-7.3")
 def single_periods(context: Context) -> Item:
-    """Estimates from four periods, each by itself."""
+    """Return separate estimates from four periods."""
     taken = four_periods(context)
     each, average = taken.responses()[0], taken.averaged()[0]
     spread, scatter = spread_db(each), scatter_db(each[0])

@@ -24,7 +24,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Lines = NDArray[np.int64]
 
-# Halving it ten times more changes no response by more than a millionth.
+# A tolerance 2^10 times smaller changes no response by more than a millionth.
 _TOLERANCE = 1e-5
 
 
@@ -60,11 +60,11 @@ def records(
     starts_s: Sequence[float] = (WAITING_S,),
     machine: Machine = REAL,
 ) -> Records:
-    """Return records of one period from each of ``starts_s`` [s]; simulated once per context.
+    """Return records of one period from each of ``starts_s`` [s], simulated once per context.
 
-    Every entry of ``realizations`` is three experiments of their own, with the multisine of
-    that number; the same number twice differs by its noise. Raises ConvergenceError if a
-    simulation does not complete.
+    Every entry of ``realizations`` stands for three separate experiments with the multisine of that
+    number. The same number twice gives the same multisine with different noise. Raises
+    ConvergenceError if a simulation does not complete.
     """
     key = ("chapter7", design, tuple(realizations), tuple(starts_s), machine)
     return context.shared(key, lambda: _simulate(context, design, realizations, starts_s, machine))
@@ -80,7 +80,7 @@ def _simulate(
     robot = context.robot
     n = round(PERIOD_S / robot.sample_time_s)
     starts = [round(s / robot.sample_time_s) for s in starts_s]
-    # One sample more: where the next record would begin.
+    # One sample more, the first of the next record.
     total = max(starts) + n + 1
     refs = np.concatenate([references(robot, design, context.seed, k) for k in realizations])
     simulated = simulate_batch(
@@ -111,9 +111,9 @@ def _spectra(signal: Real, lines: Lines) -> Complex:
 
 
 def _without_drift(position: Real) -> Real:
-    """Return a record less the straight line from its first sample to the next record's.
+    """Return a record minus the straight line from its first sample to that of the next record.
 
-    That is what integrating the velocity's transform leaves out: its mean.
+    This removes the mean velocity, which the integral of the velocity's transform leaves out.
     """
     n = position.shape[1] - 1
     slope = (position[:, -1] - position[:, 0]) / n

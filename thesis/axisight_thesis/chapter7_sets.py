@@ -22,7 +22,7 @@ STANDARD = Design()
 
 
 def repeats(context: Context) -> int:
-    """Return how many experiments an average takes: five as in the thesis."""
+    """Return the number of experiments in an average, five as in the thesis."""
     return 3 if context.quick else 5
 
 
@@ -39,7 +39,7 @@ def different(
 ) -> Complex:
     """Return one estimate from each of several realizations, (realization, n_freq, 3, 3).
 
-    Of one period each: more of them change nothing (figure 7.3).
+    Each comes from one period, because more periods change nothing (figure 7.3).
     """
     taken = records(context, design, range(count or repeats(context)), machine=machine)
     return taken.responses()[:, 0]
@@ -56,5 +56,5 @@ def linear(context: Context) -> Complex:
 
 
 def linear_curve(context: Context) -> Curve:
-    """Return the same to be drawn."""
+    """Return the curve of the response of `linear`."""
     return reference(FREQUENCY_HZ, linear(context))

@@ -22,7 +22,7 @@ PEAK_RAD_S = 12.0
 SQUARE_RAD_S = 14.0
 SMOOTHING_SAMPLES = 40
 WAITING_S = 5.0
-"""Before the first record; transients take less (figure 7.2)."""
+"""Waiting time before the first record; transients are shorter (figure 7.2)."""
 PERIODS = 4
 
 # Split and share of the peak of the multisine with more power at low frequencies.
@@ -36,8 +36,8 @@ class Design:
     """References ``T r_bb + r_sq`` of three experiments (7.1), times ``scale``.
 
     ``broadband`` is the multisine (7.5) on all lines, on odd lines, or with 60 % of its peak
-    below 5 Hz; the chirp (5.4) from 40 to 1 Hz, or that chirp with the phase that leaves no
-    mean. ``sinusoid_hz`` puts one sinusoid in its place. ``drift_rad_s`` is added on all axes.
+    below 5 Hz; or it is the chirp (5.4) from 40 to 1 Hz, or that chirp with the phase of zero mean.
+    ``sinusoid_hz`` replaces it by one sinusoid. ``drift_rad_s`` is added on all axes.
     """
 
     broadband: Broadband = "multisine"

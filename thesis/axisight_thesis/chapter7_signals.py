@@ -58,7 +58,7 @@ def _text(values: list[float], digits: int = 2) -> str:
 def _two(
     name: str, title: str, context: Context, one: Complex, other: Complex, labels: list[str]
 ) -> Item:
-    """Return the item of two responses without claims: ``one`` drawn thin, ``other`` thick."""
+    """Return an item of two responses without claims, with ``one`` drawn thin and ``other`` thick."""
     columns = [label.replace(" ", "_").replace(",", "") for label in labels]
     curves = [
         linear_curve(context),
@@ -208,7 +208,7 @@ def permutation(context: Context) -> Item:
     sets = {"T1": different(context), "T2": different(context, T2)}
     marks = landmarks({"T1": many(context), "T2": many(context, T2)})
     one, two = triple(marks, "T1", "notch_hz"), triple(marks, "T2", "notch_hz")
-    # Realization by realization: the multisine is the same with T1 and T2.
+    # Compared by realization, because the multisine is the same with T1 and T2.
     singles = [many(context), many(context, T2)]
     alone = np.array(
         [

@@ -24,7 +24,7 @@ from axisight_thesis.item import Claim, Item, item
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# Even lines, which the square wave leaves free, and none on a resonance.
+# Even lines, which the square wave does not excite, away from resonances.
 SINUSOIDS_HZ = (1.2, 2.0, 3.2, 16.0, 32.0)
 LOW_SINUSOIDS = np.array(SINUSOIDS_HZ) <= LOW_HZ
 
@@ -96,7 +96,7 @@ def single_sinusoids(context: Context) -> Item:
 
 
 def _power(context: Context) -> tuple[float, float]:
-    """Return power of sinusoid over multisine [dB], in all and at the line of the sinusoid."""
+    """Return the power of sinusoid over multisine [dB], in total and at the line of the sinusoid."""
     step = context.robot.sample_time_s
     sine, multi = (
         np.abs(np.fft.rfft(broadband(d, step, context.seed, 0).period)) ** 2

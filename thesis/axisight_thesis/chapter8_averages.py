@@ -37,7 +37,7 @@ RANDOM_PEAK_RAD_S = PEAK_RAD_S * 3.6 / 1.56
 
 
 def averaged(context: Context, runs: int) -> xr.Dataset:
-    """Return the averages over realizations of T1 with square wave; quick takes a tenth."""
+    """Return the averages over realizations of T1 with square wave, over a tenth of them if quick."""
     runs = max(runs // 10, 4) if context.quick else runs
 
     def make() -> xr.Dataset:

@@ -1,4 +1,4 @@
-"""What section 8.3.3 says of averages, as a computed yes or no."""
+"""The claims of section 8.3.3 on averages, with computed verdicts."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def _low_bias(context: Context, study: xr.Dataset, mean: str) -> Real:
 def _standard_error(context: Context, study: xr.Dataset) -> Real:
     """Return the standard error of :func:`_low_bias` for the arithmetic mean.
 
-    Lines are independent; half of E|dG|^2 is along G.
+    Lines are independent, and half of E|dG|^2 lies along G.
     """
     low = study.sel(frequency_hz=slice(0, LOW_HZ + 1e-9))
     true = true_response(context, low["frequency_hz"].values)

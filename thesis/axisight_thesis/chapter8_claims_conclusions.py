@@ -1,4 +1,4 @@
-"""What section 8.4 concludes, as a computed yes or no."""
+"""The conclusions of section 8.4, with computed verdicts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What section 8.3.1 says of the designs, as a computed yes or no."""
+"""The claims of section 8.3.1 on the designs, with computed verdicts."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def _square(context: Context) -> Result:
     "(2,1) and (3,1) at low frequency.",
 )
 def poor_snr(context: Context) -> Result:
-    """Return whether the coupling of axis 1 has 10 dB less than the diagonal."""
+    """Return whether the signal-to-noise ratio of the coupling of axis 1 is 10 dB below the diagonal."""
     lines = excited_lines()
     at = (lines / PERIOD_S <= LOW_HZ) & ~square_lines(lines)
     runs = range(realizations(context))

@@ -1,4 +1,4 @@
-"""What section 8.3.2 says of a single sinusoid, as a computed yes or no."""
+"""The claims of section 8.3.2 on a single sinusoid, with computed verdicts."""
 
 from __future__ import annotations
 

@@ -31,9 +31,9 @@ COUPLING = ((0, 1), (0, 2), (1, 0), (2, 0))
 """The coupling between axis one and axes two and three."""
 LOW_HZ = 3.0
 STANDARD_ERRORS = 3.0
-"""Beyond these an average counts as biased."""
+"""Standard errors above which an average counts as biased."""
 
-# Standard errors for a decision: nine elements are judged at a time.
+# Standard errors for a decision; three, because nine elements are tested at a time.
 _DECIDED = 3.0
 
 
@@ -56,20 +56,20 @@ class Ratio:
         return bool(abs(np.log(self.value)) > _DECIDED * self.error)
 
     def __str__(self) -> str:
-        """Value and two standard errors."""
+        """Return the value and two standard errors as text."""
         return f"{self.value:.2f} ± {2 * self.error * self.value:.2f}"
 
 
 @dataclass(frozen=True)
 class Ratios:
-    """As :class:`Ratio`, element by element, (output, input)."""
+    """Ratios like :class:`Ratio` for every element, (output, input)."""
 
     value: Real
     error: Real
 
 
 def comparison_runs(context: Context) -> int:
-    """Return over how many realizations designs are compared."""
+    """Return the number of realizations over which designs are compared."""
     return 2 if context.quick else 12
 
 
@@ -102,10 +102,10 @@ def compare(context: Context, over: int, under: int) -> Ratios:
 
 
 def except_for(ratios: Ratios, expected: set[tuple[int, int]], other: str) -> tuple[bool, str]:
-    """Return whether a design wins except for the ``expected`` elements, where the other does.
+    """Return whether a design has smaller errors except at the ``expected`` elements, and the evidence.
 
-    ``ratios`` are its errors over the other's. Elements within three standard errors of one
-    are undecided; that is no exception.
+    ``ratios`` are its errors over those of the ``other`` design. Elements within three standard errors
+    of one are undecided and do not count as exceptions.
     """
     logs = np.log(ratios.value)
     bound = _DECIDED * ratios.error
@@ -125,9 +125,10 @@ def at_square_lines(
     with_: Design,
     element: tuple[int, int] | None = None,
 ) -> tuple[Ratio, Ratio]:
-    """Return errors with square wave over those without: at its lines, and at all others.
+    """Return the ratio of errors with to those without square wave, at its lines and at all others.
 
-    Its lines are those where it is stronger than the multisine; ``element`` None takes all.
+    The lines of the square wave are those at which it is stronger than the multisine. ``element`` None
+    takes all elements.
     """
     logs = np.log(errors_of(context, with_)) - np.log(errors_of(context, without))
     logs = logs.mean(axis=(2, 3)) if element is None else logs[:, :, element[0], element[1]]

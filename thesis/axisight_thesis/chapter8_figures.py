@@ -69,16 +69,16 @@ def figure_8_2(context: Context) -> Item:
 
 
 def error_item(name: str, design: Design, found: list[Experiments], true: Complex) -> Item:
-    """Return the relative error of one realization and the mean over those of ``found``.
+    """Return the relative error of one realization, and its mean over the realizations ``found``.
 
-    Lines that the square wave excites too are marked.
+    Marks show the lines that the square wave excites too.
     """
     frequency = found[0].frequency_hz
     errors = np.array([np.abs(relative_error(f.estimate, true)) for f in found])
     mean = errors.mean(axis=0)
     curves = [Curve(frequency, errors[0], "one realization", FAINT)]
     name_of_mean = f"mean of {len(found)}"
-    if len(found) == 1:  # the mean of one is that one
+    if len(found) == 1:  # the mean would be the same curve
         curves, name_of_mean = [], "one realization"
     if design.square:
         at = square_lines(excited_lines())

@@ -39,8 +39,8 @@ SMOOTHING_SAMPLES = 40
 class Design:
     """One choice of excitation: ``r = T r_bb + r_sq`` in three experiments.
 
-    ``directions`` is T of (6.6). ``sinusoid_hz`` puts one sinusoid of the same peak in the
-    place of the multisine (section 8.3.2).
+    ``directions`` is T of (6.6). ``sinusoid_hz`` replaces the multisine by one sinusoid of the same
+    peak (section 8.3.2).
     """
 
     directions: Literal["T1", "T2"] = "T1"
@@ -48,7 +48,7 @@ class Design:
     sinusoid_hz: float | None = None
 
     def __str__(self) -> str:
-        """As in the captions of the thesis."""
+        """Return the design as in the captions of the thesis."""
         what = "" if self.sinusoid_hz is None else f", sinusoid {self.sinusoid_hz:g} Hz"
         return f"{self.directions}, {'with' if self.square else 'without'} square wave{what}"
 
@@ -69,13 +69,13 @@ def excited_lines() -> Lines:
 
 
 def square_lines(lines: Lines) -> NDArray[np.bool_]:
-    """Return which lines the square wave excites too: the odd multiples of its frequency."""
+    """Return a mask of the lines that the square wave excites too, odd multiples of its frequency."""
     ratio = round(PERIOD_S / SQUARE_PERIOD_S)
     return np.asarray((lines % ratio == 0) & (lines // ratio % 2 == 1))
 
 
 def strong_square_lines(robot: Robot) -> NDArray[np.bool_]:
-    """Return at which lines the square wave is stronger than the multisine."""
+    """Return a mask of the lines at which the square wave is stronger than the multisine."""
     lines = excited_lines()
     apart = Design("T1", square=False), Design("T1", square=True)
     without, with_ = (references(robot, d, 0, 0)[0, :, :2] for d in apart)
@@ -113,7 +113,7 @@ def _multisine(step: float, seed: int, run: int) -> Multisine:
 def clipped(signal: Multisine) -> Multisine:
     """Return a multisine of the same amplitudes and of low crest factor, Algorithm 5.1.
 
-    A hundred iterations from its own phases give 1.55 on average, as in the thesis.
+    A hundred iterations from the given phases give a crest factor of 1.55 on average, as in the thesis.
     """
     return optimize_crest_factor(
         signal,
@@ -127,9 +127,9 @@ def clipped(signal: Multisine) -> Multisine:
 def ripple(robot: Robot) -> list[Effect]:
     """Return the disturbances (8.2) of Table 8.1 on every axis.
 
-    The thesis's model is linear, so its commanded torque is the deviation from rest. Ours
-    holds the load: proportional ripple would see the static torque too, 22 and 24 Nm on
-    axes 2 and 3. Its share is therefore taken off again, by a ripple of constant amplitude.
+    The model of the thesis is linear, so its commanded torque is the deviation from rest. The torque
+    here includes the static load, 22 and 24 Nm on axes 2 and 3, to which proportional ripple would
+    apply too. A ripple of constant amplitude therefore subtracts the share of the load.
     """
     static = robot.equilibrium()["motor_torque_nm"].values
     effects = []

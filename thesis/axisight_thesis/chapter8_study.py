@@ -1,4 +1,4 @@
-"""Simulated experiments of chapter 8 as spectra, with what disturbed them."""
+"""Simulated experiments of chapter 8 as spectra, with their disturbances."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ Lines = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Experiments:
-    """One design, one realization: spectra (n_freq, channel, experiment) of the last period.
+    """Spectra (n_freq, channel, experiment) of the last period, for one realization of a design.
 
-    Commanded torque U [Nm] and measured motor velocity Y [rad/s], their disturbances V_u and
-    V_y, and the estimate ``Y U^-1`` from torque to acceleration, (n_freq, output, input).
+    They are those of commanded torque U [Nm], measured motor velocity Y [rad/s], and their disturbances
+    V_u and V_y. The estimate ``Y U^-1`` from torque to acceleration is (n_freq, output, input).
     """
 
     frequency_hz: Real
@@ -59,7 +59,7 @@ def experiments(context: Context, design: Design, run: int = 0) -> Experiments:
 
 
 def same_excitation(context: Context, design: Design, periods: int) -> list[Experiments]:
-    """Return periods in a row of one design: same excitation, new sensor noise."""
+    """Return consecutive periods of one design, with the same excitation and new sensor noise."""
 
     def make() -> list[Experiments]:
         refs = np.tile(references(context.robot, design, context.seed, 0), (1, periods + 1, 1))
@@ -110,7 +110,7 @@ def _standard(context: Context, run: int) -> dict[Design, Experiments]:
 
 def _simulated(context: Context, designs: list[Design], run: int) -> dict[Design, Experiments]:
     refs = np.concatenate([references(context.robot, d, context.seed, run) for d in designs])
-    # The noise of an experiment is its own in every realization and design.
+    # Every realization and design gets different noise.
     first = len(refs) * run if designs[0].sinusoid_hz is None else 2**32
     simulated = simulate_period(
         context, refs, ripple(context.robot), noise_seed=context.seed, first_run=first
@@ -134,9 +134,10 @@ def simulate_period(
     first_run: int = 0,
     model: Model = "linear",
 ) -> xr.Dataset:
-    """Simulate two periods of references, (experiment, sample, axis); the first is waiting time.
+    """Return the simulation of two periods of references, (experiment, sample, axis).
 
-    After it the estimates no longer change: by less than a millionth with these controllers.
+    The first period is waiting time. With these controllers a longer one changes the estimates by less
+    than a millionth.
     """
     return simulate_batch(
         context.robot,
@@ -154,7 +155,7 @@ def from_simulation(context: Context, simulated: xr.Dataset, lines: Lines) -> Ex
     n = simulated.sizes["time"] // 2
     step = context.robot.sample_time_s
     torque = simulated["torque_disturbance_nm"].values[:, n:]
-    # The plant sees the mean over a sample, not its beginning.
+    # The mean over a sample acts on the plant, not the value at its beginning.
     torque = 0.5 * (torque + np.roll(torque, -1, axis=1))
     position = simulated["position_disturbance_rad"].values[:, n:]
     command = simulated["torque_cmd_nm"].values[:, n:]
@@ -179,7 +180,7 @@ def _spectrum(x: Real, lines: Lines) -> Complex:
 
 
 def _without_drift(position: Real, n: int) -> Real:
-    """Return the last period, its drift over a period removed as a straight line."""
+    """Return the last period minus its drift over a period, a straight line."""
     late = n // 4
     before, after = position[:, n - late : n], position[:, 2 * n - late :]
     slope = (after.mean(axis=1) - before.mean(axis=1)) / n

@@ -52,15 +52,15 @@ THESIS_8_4 = np.array(
     ]
 )
 
-# The thesis does not say where its sinusoid lies; its multisine's errors there, up to 400 %,
-# are those of the lower end of the band. 1.1 Hz is no line of the square wave.
+# The thesis does not give the frequency of its sinusoid. The errors of its multisine there, up to
+# 400 %, occur at the lower end of the band. 1.1 Hz is not a line of the square wave.
 SINUSOID_HZ = 1.1
 SINUSOID = Design("T1", square=True, sinusoid_hz=SINUSOID_HZ)
 MULTISINE = Design("T1", square=True)
 
 
 def realizations(context: Context) -> int:
-    """Return over how many realizations the tables average."""
+    """Return the number of realizations over which the tables average."""
     return 2 if context.quick else 4
 
 
@@ -115,7 +115,7 @@ def single_frequency_error(context: Context) -> Real:
 
 @item("table-8.1")
 def table_8_1(context: Context) -> Item:
-    """Return the disturbances, as the simulation has them."""
+    """Return the disturbances of the simulation."""
     parts = {
         "a_n [Nm]": TORQUE_RIPPLE_NM,
         "b_n [1]": PROPORTIONAL_RIPPLE,
@@ -135,7 +135,7 @@ def table_8_1(context: Context) -> Item:
 
 @item("table-8.2")
 def table_8_2(context: Context) -> Item:
-    """Return the mean relative errors of the four designs beside the thesis's."""
+    """Return the mean relative errors of the four designs, next to those of the thesis."""
     here = mean_errors(context)
     factor = here / THESIS_8_2
     rows = [
@@ -204,7 +204,7 @@ def _rows(head: dict[str, str], thesis: Real, here: Real, unit: str) -> list[dic
 
 
 def _layout(here: Real) -> pd.DataFrame:
-    """Return Table 8.2 as it is printed: without square wave left, with it right."""
+    """Return Table 8.2 in its printed layout: without square wave left, with square wave right."""
     columns = [f"{square} {j}" for square in ("without", "with") for j in (1, 2, 3)]
     blocks = [np.hstack([here[0], here[1]]), np.hstack([here[2], here[3]])]
     table = pd.DataFrame(np.vstack(blocks), columns=columns)

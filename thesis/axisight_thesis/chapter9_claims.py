@@ -1,4 +1,4 @@
-"""What chapter 9 says, as a computed yes or no, and when the cubic spring would matter."""
+"""The claims of chapter 9, with computed verdicts, and a study of when the cubic spring matters."""
 
 from __future__ import annotations
 

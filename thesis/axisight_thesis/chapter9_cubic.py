@@ -1,7 +1,7 @@
-"""When does the cubic spring matter: the puzzle at the end of section 9.5.
+"""The importance of the cubic spring: the puzzle at the end of section 9.5.
 
-Measured responses stiffen with amplitude, yet the fit hardly depends on k3. What the thesis
-could not do is done here: the truth is changed, and everything repeated.
+Measured responses stiffen with amplitude, yet the fit hardly depends on k3. The thesis could not
+change its machine. This study changes the simulated machine and repeats all steps.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from axisight_thesis.context import Context
 STANDARD = Machine()
 K3 = M3["cubic_stiffness"]
 THESIS_STIFFENING = (1.12e6 - 9.78e5) / 9.78e5
-"""Of the stiffness from set 2 to set 3, section 9.5.2."""
+"""Relative increase of the stiffness from set 2 to set 3, section 9.5.2."""
 
 
 @dataclass(frozen=True)
@@ -71,20 +71,21 @@ _QUICK = ("as in the tables", LARGE, _ALONE[0], _ALONE[2], "no Coulomb friction"
 
 @dataclass(frozen=True)
 class Importance:
-    """What one case says of k3.
+    """The importance of k3 in one case.
 
     true, estimate
-        k3 of the machine and of two masses fitted to all sets.
+        k3 [Nm/rad^3] of the machine, and of two masses fitted to all sets.
     white_error, sandwich_error
         Standard errors of the estimate, for white residuals and from blocks of data.
     loss
-        Points of fit (3.54) lost without k3, everything else fitted again; by data set.
+        Points of fit (3.54) lost without k3 when all other parameters are fitted again; by data set.
     row
-        Change of fit with k3 20 % larger and smaller, the largest in size; by data set.
+        Largest change of fit with k3 20 % larger or smaller; by data set.
     fit
         Fit with k3, by data set.
     stiffening
-        Of the squared notch from set 2 to set 3; NaN where a response has no clear notch.
+        Relative increase of the squared notch frequency from set 2 to set 3; NaN if a response has no
+        clear notch.
     """
 
     case: Case
@@ -99,12 +100,12 @@ class Importance:
 
 
 def importance(context: Context, case: Case) -> Importance:
-    """Return what a case says of k3."""
+    """Return the importance of k3 in a case."""
     return context.shared(("chapter 9 cubic", case), lambda: _importance(context, case))
 
 
 def by_name(context: Context, name: str) -> Importance:
-    """Return what the case of this name says."""
+    """Return the importance of k3 in the case of this name."""
     return importance(context, next(c for c in CASES if c.name == name))
 
 
@@ -113,7 +114,7 @@ def _importance(context: Context, case: Case) -> Importance:
     try:
         initial(context, case.machine, case.scale)
     except InputError:
-        # Strongly bent springs leave no clear notch or plateau: start as the standard machine.
+        # Strongly nonlinear springs have no clear notch or plateau, so the standard machine's start is used.
         start = initial(context, STANDARD).start
     with_cubic, without = (
         fitted(
@@ -209,7 +210,7 @@ def three_mass_table(context: Context) -> pd.DataFrame:
 
 
 def figure(context: Context) -> Figure:
-    """Return estimated over true k3, and what removing it costs, over the true k3."""
+    """Return a figure, over true k3, of estimated over true k3 and of the loss of fit without it."""
     estimates = three_mass_table(context)
     losses = _chosen(context, ("k3 = 0", *_SERIES))
     alone = _chosen(context, _ALONE)

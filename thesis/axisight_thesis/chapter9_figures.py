@@ -39,15 +39,15 @@ class _Line:
 
 
 def small_motion(frequency_hz: Real) -> Complex:
-    """Return torque to acceleration of the machine without dry friction and cubic spring."""
+    """Return the response from torque to acceleration without dry friction and cubic spring."""
     free = replace(chain(), gear_ratio=GEAR_RATIO).acceleration_response(frequency_hz)
-    # Viscous friction is feedback from the motor's speed to its torque.
+    # Viscous friction acts as feedback from the motor's speed to its torque.
     s = 2j * np.pi * frequency_hz
     return np.asarray(free / (1 + M3["viscous_friction"] * free / s))
 
 
 def two_mass_velocity(parameters: Mapping[str, float], frequency_hz: Real) -> Complex:
-    """Return torque to velocity of two masses without cubic spring and dry friction, (9.13)."""
+    """Return the response (9.13) of two masses, torque to velocity, without cubic spring and dry friction."""
     s = 2j * np.pi * frequency_hz
     spring = parameters["k1"] + s * parameters["d"]
     arm = s**2 * parameters["J_a"]
@@ -91,7 +91,7 @@ def figure_9_2(context: Context) -> Item:
 
 @item("figure-9.3")
 def figure_9_3(context: Context) -> Item:
-    """Return the same from motor torque to motor velocity, with model m3 linearized."""
+    """Return the responses from motor torque to motor velocity, with the linearized model m3."""
     found = estimates(context)
     lines = []
     for number in BROADBAND:
@@ -132,7 +132,7 @@ def _figure(lines: Sequence[_Line], label: str, limits: tuple[float, float]) -> 
 
 
 def _table(lines: Sequence[_Line]) -> pd.DataFrame:
-    """Return curves by frequency; those on other frequencies take part where they are given."""
+    """Return the curves as a table over frequency; a curve is empty at frequencies that it lacks."""
     parts = [
         pd.Series(line.magnitude, np.round(line.angular_rad_s, 9), name=line.name) for line in lines
     ]

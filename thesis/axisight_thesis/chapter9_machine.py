@@ -1,9 +1,9 @@
-"""The stand-in for axis 1 of chapter 9: model m3 of Table 9.1, its arm in two, and ripple.
+"""The machine that replaces axis 1 of chapter 9: model m3 of Table 9.1 with a divided arm, and ripple.
 
-What the thesis identified with a two-mass model was no two-mass system: "to capture the two
-resonance peaks around 60 and 80 rad/s, (at least) a three-mass model would be needed". The
-truth here keeps motor inertia, total inertia, cubic spring and friction of m3 and splits its arm
-so that the small motion has
+The thesis fitted a two-mass model to a system with more masses: "to capture the two resonance peaks
+around 60 and 80 rad/s, (at least) a three-mass model would be needed". The machine here keeps motor
+inertia, total inertia, cubic spring and friction of m3, and divides its arm so that the small motion
+has
 
 =============================  ==========  =====================================
 notch of m3, sqrt(k1 / J_a)    35.9 rad/s  kept
@@ -12,9 +12,9 @@ second notch                   76.4        follows: notches over peaks are fixed
                                            the inertias, J_m / (J_m + r^2 J_a)
 =============================  ==========  =====================================
 
-Two notches and two peaks fix the chain (:func:`axisight.graybox.reconstruct_chain`). The damping
-of m3 stays in the gear; the arm's spring has the same damping in proportion to its stiffness.
-The ripple is that of Table 8.1, the sensor that of section 8.1.
+Two notches and two peaks determine the chain (:func:`axisight.graybox.reconstruct_chain`). The gear
+has the damping of m3; the arm's spring has the same ratio of damping to stiffness.
+The ripple is that of Table 8.1, and the sensor that of section 8.1.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ SMOOTHING_RAD_S = 0.01
 
 @dataclass(frozen=True)
 class Machine:
-    """The axis; what differs from the standard asks what if."""
+    """The machine; the defaults are the standard one."""
 
     cubic_nm_rad3: float = M3["cubic_stiffness"]
     coulomb_nm: float = M3["coulomb_friction"]
@@ -56,7 +56,7 @@ class Machine:
     noise: bool = True
 
     def effects(self, robot: Robot) -> list[Effect]:
-        """Return what acts on the axis beside the chain."""
+        """Return the effects on the axis, in addition to the chain."""
         found = [
             Effect("nonlinear_stiffness", 1, {"cubic_nm_rad3": self.cubic_nm_rad3}),
             Effect(

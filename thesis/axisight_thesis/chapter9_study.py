@@ -1,4 +1,4 @@
-"""The experiment of section 9.4 on the stand-in, and the models of section 9.5."""
+"""The experiment of section 9.4 on the simulated machine, and the models of section 9.5."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _SETTINGS = FitSettings(max_iterations=30, loss_tolerance=1e-9, step_tolerance=1
 
 @dataclass(frozen=True)
 class Records:
-    """What was recorded.
+    """The records of the experiment.
 
     data
         The three data sets of section 9.4, from rest.
@@ -116,7 +116,7 @@ def _first(data: AxisData, samples: int) -> AxisData:
 
 
 def initial(context: Context, machine: Machine, scale: float = 1.0) -> InitialModel:
-    """Return steps 1 and 2 as the thesis does them: (9.14) sample by sample, no damping."""
+    """Return steps 1 and 2 as in the thesis: (9.14) over samples, without damping."""
 
     def make() -> InitialModel:
         taken = records(context, machine, scale)
@@ -135,7 +135,7 @@ def initial(context: Context, machine: Machine, scale: float = 1.0) -> InitialMo
 
 
 def responses(context: Context, machine: Machine, scale: float = 1.0) -> dict[int, xr.Dataset]:
-    """Return torque to motor acceleration of sets 2 and 3, from the steady period."""
+    """Return the responses from torque to motor acceleration of sets 2 and 3, from the steady period."""
 
     def make() -> dict[int, xr.Dataset]:
         found = {}
@@ -160,7 +160,7 @@ def fitted(
     start: Mapping[str, float] | None = None,
     max_iterations: int = 30,
 ) -> AxisFit:
-    """Return step 3 on some data sets; without ``cubic`` k3 is held at zero."""
+    """Return the fit of step 3 to some data sets; without ``cubic`` k3 is held at zero."""
     key = "chapter 9 fit", machine, sets, scale, cubic, start is None, max_iterations
 
     def make() -> AxisFit:
@@ -178,9 +178,9 @@ def fitted(
 
 
 def three_masses(context: Context, machine: Machine, *, cubic: bool = True) -> AxisFit:
-    """Return a fit of three masses to all sets, started a tenth off the chain of small motion.
+    """Return a fit of three masses to all sets, from a start 10 % off the chain of small motion.
 
-    Without ``cubic`` the springs are linear; that fit starts where the other ended.
+    Without ``cubic`` the springs are linear, and the fit starts at the end of the cubic one.
     """
 
     def make() -> AxisFit:
@@ -208,7 +208,7 @@ def simulated(parameters: Mapping[str, float], data: AxisData) -> Real:
 
 
 def measured(data: AxisData) -> Real:
-    """Return the velocity it is compared with."""
+    """Return the measured velocity of a data set, for comparison with :func:`simulated`."""
     return data.measured(MODEL)
 
 

@@ -23,7 +23,7 @@ from axisight_thesis.item import Item, item
 
 STANDARD = Machine()
 
-# What the thesis has, columns m0 to m3.
+# Values of the thesis, columns m0 to m3.
 TABLE_9_1 = {
     "J_m": (1.23e-2, 1.26e-2, 1.22e-2, 1.21e-2),
     "J_a": (0.79e3, 1.07e3, 1.11e3, 1.13e3),
@@ -52,7 +52,7 @@ _MODELS = ("m0", "m1", "m2", "m3")
 
 
 def truth() -> dict[str, float]:
-    """Return the parameters of the machine by the names of the two-mass model.
+    """Return the parameters of the machine, by parameter names of the two-mass model.
 
     J_a is the inertia of both parts of the arm, k1 and d those of the gear.
     """
@@ -85,7 +85,7 @@ def sensitivity(context: Context, parameters: Mapping[str, float] | None = None)
 
 @item("table-9.1")
 def table_9_1(context: Context) -> Item:
-    """Return the estimated parameters beside those of the thesis and the truth."""
+    """Return the estimated parameters next to those of the thesis and the truth."""
     found = models(context, STANDARD)
     rows = []
     for name in NAMES:
@@ -99,7 +99,7 @@ def table_9_1(context: Context) -> Item:
 
 @item("table-9.2")
 def table_9_2(context: Context) -> Item:
-    """Return the model fits beside those of the thesis."""
+    """Return the model fits next to those of the thesis."""
     found = fits(context)
     rows = []
     for n in SETS:

@@ -1,4 +1,4 @@
-"""What items share: the robot, the seed, and studies simulated once."""
+"""The context that items share: the robot, the seed, and cached studies."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ class Context:
     robot
         The robot of the study.
     seed
-        Rules phases and noise; items draw further streams by the run index.
+        Seed of phases and noise; items draw further streams by the run index.
     threads
-        For simulations; 0 takes every core. No result depends on it.
+        Number of threads of simulations, 0 for every core. Results do not depend on it.
     quick
-        Fewer realizations, for a look and for tests; claims then may not hold.
+        Whether to take fewer realizations, for a preview and for tests; claims may then not hold.
     report
-        Called with one line when a longer piece of work begins.
+        Function called with one line when a longer computation begins.
     """
 
     robot: Robot
@@ -35,7 +35,7 @@ class Context:
     _studies: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     def shared(self, key: Hashable, make: Callable[[], T]) -> T:
-        """Return what ``make`` gives, computed once per context for each ``key``."""
+        """Return the result of ``make``, computed once per context for each ``key``."""
         if key not in self._studies:
             self._studies[key] = make()
         value: T = self._studies[key]

@@ -1,4 +1,4 @@
-"""Yes, no or undecided from the spread over realizations."""
+"""Decisions (yes, no or undecided) from the spread over realizations."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ PROBABILITY = 0.95
 def positive(values: ArrayLike) -> bool | None:
     """Return whether the mean of independent values is above zero; None if undecided.
 
-    Decided where zero lies outside the 95 % interval of the mean, by Student's t; one value
-    alone decides nothing, values that are all the same do.
+    The result is decided if zero lies outside the 95 % interval of the mean, by Student's t. A single
+    value decides nothing; equal values do.
     """
     middle, half = _interval(values)
     if abs(middle) <= half:
@@ -25,14 +25,14 @@ def positive(values: ArrayLike) -> bool | None:
 
 
 def all_of(verdicts: Sequence[bool | None]) -> bool | None:
-    """Return False if one is, else None if one is undecided, else True."""
+    """Return False if any verdict is False, else None if any is undecided, else True."""
     if any(v is False for v in verdicts):
         return False
     return None if any(v is None for v in verdicts) else True
 
 
 def interval(values: ArrayLike, form: str = "+.2f") -> str:
-    """Return mean and 95 % interval in words."""
+    """Return mean and 95 % interval as text."""
     middle, half = _interval(values)
     return f"{middle:{form}} ± {half:{form.lstrip('+')}}"
 

@@ -43,7 +43,7 @@ def element_figure(
     log: bool = True,
     every: float | None = None,
 ) -> Figure:
-    """Return a Figure of elements; row is output or channel, column input or experiment.
+    """Return a Figure of elements, with outputs or channels over rows, inputs or experiments over columns.
 
     All panels share both axes, so that elements can be compared by eye. ``every`` is the step
     of the vertical ticks.
@@ -57,7 +57,7 @@ def element_figure(
     _frequency_axis(grid[0, 0], curves[0].frequency_hz)
     if every is not None:
         grid[0, 0].yaxis.set_major_locator(MultipleLocator(every))
-    # Several decades need no minor ticks, and they take most of the time of drawing.
+    # Minor ticks are not needed over several decades, and take most of the time of drawing.
     grid[0, 0].yaxis.set_minor_locator(NullLocator())
     if ylim is not None:
         grid[0, 0].set_ylim(*ylim)
@@ -75,8 +75,8 @@ def element_figure(
 def element_table(**columns: tuple[Real, Real]) -> pd.DataFrame:
     """Return curves as a table: ``frequency_hz`` and one column per curve and element.
 
-    Each is (frequency_hz, values); columns are called ``name_11``, ``name_12``, ... Curves at
-    other frequencies than the first take part where they are given.
+    Each curve is (frequency_hz, values); columns are called ``name_11``, ``name_12``, ... Curves at
+    other frequencies than those of the first are empty at the frequencies that they lack.
     """
     tables = []
     for name, (frequency, values) in columns.items():

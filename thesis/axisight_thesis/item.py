@@ -1,4 +1,4 @@
-"""Items of the study and where they register."""
+"""Items of the study and their registration."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ class Claim:
     id
         Short and unique, e.g. ``"8.3.1-symmetry"``.
     section
-        Where the thesis makes it, e.g. ``"8.3.1"``.
+        Section of the thesis, e.g. ``"8.3.1"``.
     statement
-        What it says, in own words.
+        The statement, paraphrased.
     holds
-        What the computation gave; None where the spread over realizations decides neither way.
+        Whether the computation confirms the statement; None if the spread over realizations leaves it
+        undecided.
     evidence
-        The computed figures behind it.
+        The computed figures for the verdict.
     """
 
     id: str
@@ -46,8 +47,8 @@ class Claim:
 class Item:
     """One table or figure of the thesis, computed.
 
-    ``tables`` and ``figures`` are keyed by a suffix of the file name; ``""`` for the only or
-    main one: ``{"": frame}`` of ``figure-8.4`` is ``figure-8.4.csv``.
+    ``tables`` and ``figures`` map suffixes of the file name to their content, with ``""`` for the only
+    or main one: ``{"": frame}`` of ``figure-8.4`` is ``figure-8.4.csv``.
     """
 
     name: str
@@ -67,7 +68,7 @@ class Statements:
     """The statements of one section, each with the function that checks it, in order."""
 
     def __init__(self, section: str) -> None:
-        """Begin with none."""
+        """Start an empty list of statements."""
         self._section = section
         self._checks: list[tuple[str, str, Check]] = []
 
@@ -125,9 +126,9 @@ def registered() -> dict[str, Make]:
 
 
 def item_names(name: str) -> list[str]:
-    """Return the names that ``name`` stands for: ``all``, one item, or a part as ``figure-8``.
+    """Return the items that ``name`` selects: ``all``, one item, or a part such as ``figure-8``.
 
-    Raises InputError with the known names for any other.
+    Raises InputError with the known names for other names.
     """
     known = list(registered())
     if name == "all":
@@ -139,7 +140,7 @@ def item_names(name: str) -> list[str]:
 
 
 def _order(name: str) -> tuple[str, int, str]:
-    """Chapter, number, kind: 8.2 before 8.10, appendices after chapters, claims last."""
+    """Return the sort key of a name: 8.2 before 8.10, appendices after chapters, claims last."""
     match = re.fullmatch(r"([a-z]+)-(\w+)(?:\.(\d+))?", name)
     if match is None:
         raise ValueError(f"item {name!r}: expected a name as figure-8.4 or claims-8")

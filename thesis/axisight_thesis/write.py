@@ -21,10 +21,10 @@ def run(
     out: Path | None = None,
     progress: Progress = lambda name, done, total: None,
 ) -> list[Item]:
-    """Compute the items that ``name`` stands for, in order; write them if ``out`` is given.
+    """Return the computed items that ``name`` selects, in order, and write them to ``out`` if given.
 
-    ``progress`` is called with the item about to be computed, the number done and the total.
-    Raises InputError for an unknown name, before anything is computed.
+    ``progress`` is called before each item with its name, the number of finished items and the total.
+    Raises InputError for an unknown name, before any computation.
     """
     names = item_names(name)
     items = registered()
@@ -45,7 +45,7 @@ def run(
 def write_item(made: Item, out: Path, *, quick: bool = False) -> list[Path]:
     """Write tables as CSV (full precision) and figures as PDF and PNG; return the paths.
 
-    ``quick`` leaves out the PDF and draws the PNG with half the dots.
+    ``quick`` leaves out the PDF and halves the resolution of the PNG.
     """
     out.mkdir(parents=True, exist_ok=True)
     paths = []
@@ -59,10 +59,10 @@ def write_item(made: Item, out: Path, *, quick: bool = False) -> list[Path]:
 
 
 def _draw(figure: Figure, path: Path, quick: bool) -> list[Path]:
-    """Write a figure as PNG and PDF; laying it out takes most of the time and is done once."""
+    """Write a figure as PNG and PDF, and return the paths; both share the slow layout."""
     png, pdf = path.with_name(f"{path.name}.png"), path.with_name(f"{path.name}.pdf")
     figure.set_dpi(100 if quick else 200)
-    if quick:  # good enough for a look, and twice as fast
+    if quick:  # twice as fast without a layout engine
         figure.set_layout_engine(None)
         width, height = figure.get_size_inches()
         edges = 0.65 / width, 0.5 / height, 1 - 0.1 / width, 1 - 0.55 / height
@@ -71,13 +71,13 @@ def _draw(figure: Figure, path: Path, quick: bool) -> list[Path]:
     if quick:
         return [png]
     figure.set_layout_engine("none")
-    # No creation date: the same study gives the same bytes.
+    # Without a creation date, the same study gives the same bytes.
     figure.savefig(pdf, metadata={"CreationDate": None})
     return [pdf, png]
 
 
 def write_claims(claims: Iterable[Claim], out: Path) -> list[Path]:
-    """Write ``claims.csv`` and ``claims.md``, by section; return the paths."""
+    """Write ``claims.csv`` and ``claims.md``, ordered by section, and return the paths."""
     out.mkdir(parents=True, exist_ok=True)
     claims = sorted(claims, key=lambda c: c.section)
     columns = ["id", "section", "statement", "holds", "evidence"]

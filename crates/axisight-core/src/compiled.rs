@@ -1,5 +1,6 @@
-//! The numbers that effects by name and the linear plant are compiled for, so that crates above
-//! use these copies; see [`axisight_plant::compiled`].
+//! Scalars for which effects by name and the linear plant are compiled.
+//!
+//! Later crates use these copies; see [`axisight_plant::compiled`].
 
 use crate::plant::{assemble, stepper};
 use crate::simulation::simulate_linear;
@@ -7,7 +8,8 @@ use axisight_plant::simulation::Sample;
 use axisight_scalar::{Lanes, Scalar};
 use std::hint::black_box;
 
-/// The scalars of [`axisight_plant::compiled`]; the linear plant carries no derivatives.
+/// Reference every function that later crates call, for the scalars of
+/// [`axisight_plant::compiled`]. The linear plant has no derivatives.
 #[inline(never)] // or it would be compiled above, where it is not called
 pub fn compiled() {
     axisight_plant::for_compiled_scalars!(effects);

@@ -1,9 +1,9 @@
-//! Fits that know no effect by name: axis models in the time domain, torque regressors of a
+//! Fits that know no effect by name: axis models in the time domain, and torque regressors of a
 //! chain.
 //!
-//! They stand on the plant alone, so that a new effect leaves them as they are.
+//! The crate depends on the plant only, so a new effect does not change it.
 
-// Kernels are generic over the scalar and must be inlined to become vector code.
+// Kernels are generic over the scalar and become vector code only if they are inlined.
 #![allow(clippy::inline_always)]
 
 pub mod axis;

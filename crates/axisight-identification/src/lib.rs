@@ -1,4 +1,4 @@
-//! Fits of a robot with effects by name: to logs in the time domain, to frequency responses.
+//! Fits of a robot with effects by name, to logs in the time domain and to frequency responses.
 
 pub mod frequency;
 pub mod logs;

@@ -1,4 +1,4 @@
-//! A block of consecutive runs: the unit of work, storage and repetition.
+//! A block of consecutive runs, which is the unit of work, of storage and of repetition.
 
 use super::error::StudyError;
 use super::simulate::{Group, GroupPlant, Job, Model, Outcome};
@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 type C = Complex<f64>;
 
-/// What happened to a run that did not give a response, or not all of it.
+/// Reason why a run gave no response, or only a part of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FailureKind {
     /// A state became infinite or NaN: the loop is unstable.
@@ -27,7 +27,7 @@ pub enum FailureKind {
     InvalidParameters,
     /// The arm does not settle with the drawn parameters.
     NoEquilibrium,
-    /// The experiments do not excite all inputs at some lines; the others count.
+    /// The experiments do not excite all inputs at some lines. All other lines count.
     SingularLines,
 }
 
@@ -42,7 +42,7 @@ impl FailureKind {
         Self::SingularLines,
     ];
 
-    /// Name for people and files.
+    /// Name for reports and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Diverged => "diverged",
@@ -60,15 +60,15 @@ impl FailureKind {
 pub struct Failure {
     /// Run number.
     pub run: u64,
-    /// What happened.
+    /// Kind of the failure.
     pub kind: FailureKind,
-    /// First experiment it happened in; zero where it concerns the whole run.
+    /// First experiment with the failure; zero if it concerns the whole run.
     pub experiment: usize,
     /// Sample at which the simulation stopped, or the number of singular lines.
     pub detail: usize,
 }
 
-/// Accumulators over the runs of a block.
+/// Accumulated results of the runs of a block.
 #[derive(Debug, Clone)]
 pub struct Block {
     /// Means and covariances.
@@ -77,18 +77,17 @@ pub struct Block {
     pub sketch: QuantileSketch,
     /// Failed runs, in order.
     pub failures: Vec<Failure>,
-    /// Every response, `(run, line, output, input)`, NaN where a run failed; empty unless
-    /// asked for.
+    /// Every response, `(run, line, output, input)`, NaN for failed runs; empty unless requested.
     pub responses: Vec<C>,
 }
 
-/// Why a block gave no result.
+/// Reason why a block gave no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BlockError {
-    /// The caller asked to stop.
+    /// The caller cancelled the block.
     #[error("cancelled")]
     Cancelled,
-    /// Run numbers must fit in the random streams.
+    /// The run number is too large for the random streams.
     #[error("run: expected less than 2^40, got {0}")]
     Run(u64),
     /// The quantile accuracy is out of range.
@@ -96,13 +95,14 @@ pub enum BlockError {
     Sketch(#[from] axisight_spectra::ensemble::SketchError),
 }
 
-/// The noise stream number is `(run * axes + experiment) << 16 | axis`, in 64 bits.
+/// The number of a noise stream is `(run * axes + experiment) << 16 | axis`, in 64 bits.
 const MOST_RUNS: u64 = 1 << 40;
 
-/// Runs `first` to `first + count - 1` of a study; serial.
+/// Compute the runs `first` to `first + count - 1` of a study, on the calling thread.
 ///
 /// # Errors
-/// [`BlockError`] when cancelled or misused; trouble of a run is a [`Failure`].
+/// [`BlockError`] if the block is cancelled or an argument is invalid. A failure of a run is a
+/// [`Failure`].
 pub fn run_block(
     study: &Study,
     seed: u64,
@@ -152,8 +152,9 @@ pub fn run_block(
     Ok(sink.block)
 }
 
-/// Lanes over the experiments of all runs: they share the plant, and what one lane does
-/// cannot change another, as every operation is elementwise and steps are fixed.
+/// Simulate all runs on one plant, with the experiments of all runs as lanes.
+///
+/// Lanes do not affect each other, because every operation is elementwise and the steps are fixed.
 fn share_plant(
     study: &Study,
     seed: u64,
@@ -196,7 +197,7 @@ fn share_plant(
     Ok(())
 }
 
-/// A run whose plant could not be built.
+/// The failure of a run whose plant could not be built.
 fn unbuilt(run: u64, kind: FailureKind) -> Failure {
     Failure {
         run,
@@ -216,8 +217,10 @@ fn own_plant(study: &Study, seed: u64, run: u64) -> Result<GroupPlant, FailureKi
     })
 }
 
-/// Lanes over the experiments of one run: adaptive steps are shared by the lanes, so runs
-/// stay apart, or a response would depend on which runs it was computed with.
+/// Simulate one run, with its experiments as lanes.
+///
+/// Lanes share adaptive steps, so runs are kept separate. Otherwise a response would depend on the
+/// other runs in its lanes.
 fn one_run(
     study: &Study,
     seed: u64,
@@ -271,7 +274,7 @@ fn collect(run: u64, outcomes: Vec<(Job, Outcome)>) -> Result<Vec<Spectra>, Fail
     Ok(out)
 }
 
-/// Accumulates runs in order.
+/// Accumulates the runs in their order.
 struct Sink<'a> {
     study: &'a Study,
     omega: Vec<f64>,
@@ -313,7 +316,7 @@ impl Sink<'_> {
         let mut solver = SmallSolver::new(n);
         let mut inverse = vec![C::default(); n * n];
         for (line, matrix) in g.chunks_exact(n * n).enumerate() {
-            // A singular line is NaN as a whole.
+            // All elements of a singular line are NaN.
             if !matrix[0].re.is_finite() {
                 continue;
             }

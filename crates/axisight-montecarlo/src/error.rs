@@ -1,20 +1,20 @@
-//! What may be wrong with a study.
+//! Errors in the settings of a study.
 
 use axisight_core::plant::{EquilibriumError, PlantError};
 use axisight_core::simulation::LinearPlantError;
 use axisight_spectra::excitation::ExcitationError;
 
-/// A study that cannot be run.
+/// Reason why a study cannot be run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StudyError {
-    /// A field has an impossible value.
+    /// A field has an invalid value.
     #[error("{field}: expected {expected}, got {got}")]
     Field {
-        /// Field.
+        /// Name of the field.
         field: &'static str,
-        /// What it should be.
+        /// Expected value.
         expected: String,
-        /// What came.
+        /// Actual value.
         got: String,
     },
     /// The excitation cannot be made.
@@ -32,7 +32,6 @@ pub enum StudyError {
 }
 
 impl StudyError {
-    // Callers hand over numbers and fresh strings alike.
     #[allow(clippy::needless_pass_by_value)]
     pub(super) fn field(field: &'static str, expected: &str, got: impl std::fmt::Display) -> Self {
         Self::Field {

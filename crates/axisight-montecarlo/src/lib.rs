@@ -1,10 +1,11 @@
 //! Monte Carlo studies: many realizations of the same identification experiment.
 //!
-//! A study is a function of (design, seed, run). Runs are cut into blocks by run number; a
-//! block is computed by one thread, its runs accumulated in order, and blocks are merged in
-//! order, so neither threads nor machines nor interruptions can change a bit of the result.
+//! A study is a function of (design, seed, run). Runs are divided into blocks by run number. One
+//! thread computes a block and accumulates its runs in order, and blocks are merged in order.
+//! Threads, machines and interruptions therefore do not change a bit of the result.
 //!
-//! The one place where simulation and frequency responses meet, so neither waits for the other.
+//! Only this crate uses both simulation and frequency responses, so that the two can be compiled in
+//! parallel.
 
 mod block;
 mod error;

@@ -1,5 +1,5 @@
-//! What is kept of a simulated experiment: the sum over its measured periods, and what
-//! tells drift and growth.
+//! Record of a simulated experiment: the sum over its measured periods, and sums for drift and
+//! growth.
 
 use axisight_core::simulation::Sample;
 use axisight_numerics::{Dft, DftScratch};
@@ -13,11 +13,11 @@ pub(super) struct Recorder<S> {
     period: usize,
     waiting: usize,
     total: usize,
-    /// Sums over the measured periods, `(axis, sample)`: each axis is transformed by itself.
+    /// Sums over the measured periods, `(axis, sample)`, because each axis has its own transform.
     command: Vec<S>,
     position: Vec<S>,
-    /// Over the last two periods, per axis: sums of position (last quarter of the period
-    /// only), command and squared command.
+    /// For each of the last two periods and each axis: sums of the position (over the last quarter
+    /// of the period), the command and the squared command.
     sums: [Vec<[S; 3]>; 2],
 }
 
@@ -66,8 +66,8 @@ impl<S: Scalar> Recorder<S> {
         self.period - (self.period / 4).max(1)
     }
 
-    /// Whether the commands of `lane` keep growing: their scatter more than triples from
-    /// one period to the next, which only an unstable loop does once excited steadily.
+    /// Whether the commands of `lane` keep growing. Their standard deviation more than triples from
+    /// one period to the next, which under steady excitation happens only in an unstable loop.
     pub(super) fn grows(&self, lane: usize) -> bool {
         let count = self.period as f64;
         (0..self.n_axes).any(|i| {
@@ -77,12 +77,12 @@ impl<S: Scalar> Recorder<S> {
                 (square - mean * mean, square)
             };
             let ((before, _), (after, size)) = (scatter(0), scatter(1));
-            // Rounding of a constant command is no scatter.
+            // The rounding of a constant command does not count as scatter.
             after > 9.0 * before && after > 1e-12 * size
         })
     }
 
-    /// Spectra of one lane at `lines`; the linear drift of the position is removed.
+    /// Spectra of one lane at `lines`, with the linear drift of the position removed.
     pub(super) fn spectra(
         &self,
         lane: usize,
@@ -100,7 +100,7 @@ impl<S: Scalar> Recorder<S> {
         let count = (self.period - self.tail_start()) as f64;
         for i in 0..n {
             let tail = |t: usize| self.sums[t][i][0].lane(lane);
-            // Drift per period, times the periods summed, per sample.
+            // Drift per period, times the number of summed periods, per sample.
             let slope = (tail(1) - tail(0)) / count * measured / self.period as f64;
             let own = i * self.period..(i + 1) * self.period;
             let (command, position) = (&self.command[own.clone()], &self.position[own]);

@@ -1,4 +1,5 @@
-//! Simulation of a group of experiments; the one place that knows linear from nonlinear.
+//! Simulation of a group of experiments. Only this module distinguishes linear and nonlinear
+//! plants.
 
 use super::error::StudyError;
 use super::record::Recorder;
@@ -14,10 +15,10 @@ use axisight_scalar::Scalar;
 use axisight_spectra::frf::Spectra;
 use std::sync::atomic::AtomicBool;
 
-/// Which plant a study simulates.
+/// The plant that a study simulates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Model {
-    /// Linearized about the start, propagated exactly; see [`LinearPlant`].
+    /// Linearized at the start and propagated exactly, see [`LinearPlant`].
     Linear {
         /// Steps per sample, for the ripple.
         substeps: usize,
@@ -94,7 +95,7 @@ impl GroupPlant {
         }
     }
 
-    /// Whether the integrator takes single runs only.
+    /// Whether the integrator can simulate single runs only.
     fn one_at_a_time(&self) -> bool {
         matches!(self, Self::Nonlinear { method, .. } if method.may_be_implicit())
     }
@@ -112,7 +113,7 @@ impl GroupPlant {
 /// How an experiment ended.
 pub(super) enum Outcome {
     Completed(Spectra),
-    /// The commands keep growing.
+    /// The commands keep growing, so the loop is unstable.
     Unstable,
     Stopped(Status),
     NoEquilibrium,
@@ -120,7 +121,7 @@ pub(super) enum Outcome {
 
 /// Simulate up to `S::LANES` experiments on one plant, in lock-step.
 ///
-/// A status other than completed belongs to the whole group: see [`Group::run`].
+/// A status other than completed holds for the whole group, see [`Group::run`].
 fn lock_step<S: Scalar>(group: &Group<'_>, jobs: &[Job]) -> Result<Vec<Outcome>, Status> {
     let (study, seed) = (group.study, group.seed);
     let settings = &study.settings;
@@ -187,8 +188,10 @@ pub(super) struct Group<'a> {
 }
 
 impl Group<'_> {
-    /// Simulate `jobs`, at most `S::LANES` of them. Where one lane stops, all do; the jobs
-    /// are then repeated one by one, so that a run cannot spoil its neighbours.
+    /// Simulate `jobs`, at most `S::LANES` of them.
+    ///
+    /// If one lane stops, all lanes stop. The jobs are then repeated one by one, so that a run does
+    /// not affect its neighbours.
     pub(super) fn run<S: Scalar>(&self, jobs: &[Job]) -> Vec<Outcome> {
         if S::LANES > 1 && self.plant.one_at_a_time() {
             let single = |job| self.run::<f64>(std::slice::from_ref(job));

@@ -1,4 +1,4 @@
-//! Parameters that vary from run to run, as a function of (seed, run).
+//! Parameters that vary from run to run, as functions of (seed, run).
 
 use super::error::StudyError;
 use axisight_core::effects;
@@ -16,34 +16,36 @@ pub enum Distribution {
     Uniform,
 }
 
-/// What varies.
+/// The quantity that varies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SpreadTarget {
     /// A physical parameter of the robot.
     Robot(Parameter),
-    /// A parameter of an effect: index among the effects, index in its table.
+    /// A parameter of an effect: index in the list of effects, then in the table of the effect.
     Effect(usize, usize),
 }
 
-/// One varying parameter: `value (1 + relative z) + absolute z` with `z` of the distribution.
+/// One varying parameter, `value (1 + relative z) + absolute z` with a random `z`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
-    /// What varies.
+    /// The quantity that varies.
     pub target: SpreadTarget,
-    /// How.
+    /// Distribution of `z`.
     pub distribution: Distribution,
-    /// Scale as a fraction of the nominal value.
+    /// Scale relative to the nominal value.
     pub relative: f64,
     /// Scale in the unit of the parameter.
     pub absolute: f64,
 }
 
 impl SpreadTarget {
-    /// From a name: `axis2.stiffness` (robot parameter), `payload.mass_kg` (effect of the
-    /// arm) or `torque_ripple@1.cosine_1_nm` (effect on an axis, from 1).
+    /// The target called `name`.
+    ///
+    /// Names are `axis2.stiffness` (robot parameter), `payload.mass_kg` (effect of the arm) or
+    /// `torque_ripple@1.cosine_1_nm` (effect on an axis, counted from 1).
     ///
     /// # Errors
-    /// [`StudyError`] naming what is known.
+    /// [`StudyError`] with the known names.
     pub fn parse(
         name: &str,
         robot: &RobotDescription,
@@ -107,7 +109,7 @@ impl Spread {
     }
 }
 
-/// Robot and effects of one run. `None` if a drawn value is physically impossible.
+/// Robot and effects of one run; `None` if a drawn value is physically impossible.
 pub(super) fn draw(
     robot: &RobotDescription,
     settings: &[EffectSetting<f64>],

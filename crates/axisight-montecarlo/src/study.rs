@@ -1,4 +1,4 @@
-//! What a study simulates: robot, excitation, measurement, spread.
+//! Settings of a study: robot, excitation, measurement and spread.
 
 use super::error::StudyError;
 use super::simulate::{GroupPlant, Model};
@@ -10,12 +10,12 @@ use axisight_spectra::excitation::{Multisine, Square};
 use axisight_spectra::frf::Output;
 use nalgebra::Complex;
 
-/// Everything that defines a study; checked by [`Study::new`].
+/// Settings that define a study. [`Study::new`] checks them.
 #[derive(Debug, Clone)]
 pub struct StudySettings {
     /// Robot.
     pub robot: RobotDescription,
-    /// Effects at work, 0-based axes.
+    /// Effects to add to the robot's own.
     pub effects: Vec<EffectSetting<f64>>,
     /// Driven joint angles at rest [rad].
     pub start: Vec<f64>,
@@ -23,21 +23,21 @@ pub struct StudySettings {
     pub model: Model,
     /// Broadband reference [rad/s].
     pub multisine: Multisine,
-    /// Square wave on all axes in all experiments [rad/s].
+    /// Square wave [rad/s], on all axes in all experiments.
     pub square: Option<Square>,
-    /// `(axis, experiment)` factors of the multisine, row-major.
+    /// Factors of the multisine, row-major `(axis, experiment)`.
     pub directions: Vec<f64>,
-    /// Periods simulated before the measurement.
+    /// Number of periods before the measurement.
     pub waiting_periods: usize,
-    /// Periods averaged.
+    /// Number of measured periods, which are averaged.
     pub periods: usize,
-    /// Whether positions carry the robot's sensor noise.
+    /// Whether positions have the robot's sensor noise.
     pub noise: bool,
-    /// Corner of the noise's first-order spectrum [Hz]; white without.
+    /// Corner frequency of the noise's first-order spectrum [Hz]; `None` for white noise.
     pub noise_cutoff_hz: Option<f64>,
     /// Step of the position sensor [rad]; zero for none.
     pub resolution: f64,
-    /// Which response is estimated.
+    /// The estimated response.
     pub output: Output,
     /// Parameters that vary from run to run.
     pub spread: Vec<Spread>,
@@ -52,14 +52,14 @@ pub struct Study {
     square_period: Vec<f64>,
 }
 
-/// Longest simulated time of one experiment: 2^31 samples would not fit in memory.
+/// Largest number of samples of one experiment. More do not fit in memory.
 const MOST_SAMPLES: usize = 1 << 31;
 
 impl Study {
-    /// Check `settings`, including that the nominal plant can be built and settles.
+    /// Check `settings`, and that the nominal plant can be built and settles.
     ///
     /// # Errors
-    /// [`StudyError`] naming the field.
+    /// [`StudyError`] that names the invalid field, or says why the plant cannot be built.
     pub fn new(settings: StudySettings) -> Result<Self, StudyError> {
         let robot = &settings.robot;
         let (n, samples) = (robot.n_axes(), settings.multisine.dft().len());
@@ -73,7 +73,7 @@ impl Study {
         }
         let total = settings.waiting_periods.saturating_add(settings.periods);
         if total < 2 {
-            // The drift over a period is the difference of two periods.
+            // The drift over a period needs the difference of two periods.
             let expected = "at least 2 together with periods";
             return Err(StudyError::field("waiting_periods", expected, total));
         }
@@ -114,7 +114,7 @@ impl Study {
         })
     }
 
-    /// The checked settings.
+    /// The settings.
     pub fn settings(&self) -> &StudySettings {
         &self.settings
     }
@@ -124,7 +124,7 @@ impl Study {
         self.settings.robot.n_axes()
     }
 
-    /// Samples per period.
+    /// Number of samples per period.
     pub fn period_samples(&self) -> usize {
         self.settings.multisine.dft().len()
     }
@@ -164,9 +164,9 @@ impl Study {
         period.repeat(self.settings.waiting_periods + self.settings.periods)
     }
 
-    /// Position noise of one experiment [rad], like the reference; `None` if there is none.
+    /// Position noise of one experiment [rad], shaped like the reference; `None` if there is none.
     ///
-    /// It is the noise of the simulation's run number `run * n_axes + experiment`.
+    /// It equals the noise of a simulation with the run number `run * n_axes + experiment`.
     pub fn noise(&self, seed: u64, run: u64, experiment: usize) -> Option<Vec<f64>> {
         let (n, std) = (self.n_axes(), self.settings.robot.position_noise_std);
         let total = self.settings.waiting_periods + self.settings.periods;

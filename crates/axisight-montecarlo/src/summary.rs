@@ -1,4 +1,4 @@
-//! From accumulators to means, covariances, standard errors and quantiles.
+//! Means, covariances, standard errors and quantiles from accumulators.
 
 use axisight_numerics::SmallSolver;
 use axisight_spectra::ensemble::{MergeError, Moments, QuantileSketch};
@@ -6,17 +6,17 @@ use nalgebra::Complex;
 
 type C = Complex<f64>;
 
-/// Statistics of an ensemble of responses; every vector runs over `(line, output, input)`.
+/// Statistics of an ensemble of responses. Every vector covers `(line, output, input)`.
 ///
-/// NaN where nothing was counted, or one response only and the figure needs two.
+/// A value is NaN if there is no response, or if there is only one and the value needs two.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Summary {
-    /// Responses counted.
+    /// Number of responses.
     pub count: Vec<u64>,
     /// Arithmetic mean, Wernholt (2004), (7.7).
     pub arithmetic_mean: Vec<C>,
-    /// Logarithmic mean: magnitude (7.8), phase of the mean direction instead of (7.10),
-    /// which would depend on where the phase is cut.
+    /// Logarithmic mean, with the magnitude (7.8). The phase is that of the mean direction instead
+    /// of (7.10), which would depend on where the phase wraps.
     pub log_mean: Vec<C>,
     /// Harmonic mean, the inverse of the mean inverse matrix.
     pub harmonic_mean: Vec<C>,
@@ -28,7 +28,7 @@ pub struct Summary {
     pub covariance: Vec<f64>,
     /// Standard error of the arithmetic mean, `sqrt((var re + var im) / n)`.
     pub standard_error: Vec<f64>,
-    /// Standard error of the mean log magnitude [1]; times 8.686 in dB.
+    /// Standard error of the mean log magnitude [1]; multiply by 8.686 for dB.
     pub log_standard_error: Vec<f64>,
     /// Magnitude quantiles, `(quantile, line, output, input)`.
     pub quantiles: Vec<f64>,
@@ -43,7 +43,7 @@ pub struct Ensemble {
 }
 
 impl Ensemble {
-    /// Nothing counted yet; `lines` matrices of `n_axes` rows.
+    /// An empty ensemble of `lines` matrices with `n_axes` rows.
     ///
     /// # Errors
     /// [`axisight_spectra::ensemble::SketchError`] if the accuracy is out of range.
@@ -63,7 +63,7 @@ impl Ensemble {
     /// Add the accumulators of a block.
     ///
     /// # Errors
-    /// [`MergeError`] if their shape differs; nothing is added then.
+    /// [`MergeError`] if the shapes differ. The ensemble is then unchanged.
     pub fn merge(&mut self, moments: &Moments, sketch: &QuantileSketch) -> Result<(), MergeError> {
         let mut merged = self.moments.clone();
         merged.merge(moments)?;
@@ -77,7 +77,7 @@ impl Ensemble {
         let m = &self.moments;
         let size = m.size();
         let value = |s: usize, e: usize| m.values[s * size + e];
-        // Zero over zero is the NaN of an element without responses.
+        // Zero divided by zero is NaN, the value of an element without responses.
         let counted = |e: usize, x: f64| if m.count[e] == 0 { f64::NAN } else { x };
         let complex = |e: usize, re: f64, im: f64| C::new(counted(e, re), counted(e, im));
         let over = |s: usize, e: usize, n: f64| {
@@ -131,7 +131,7 @@ impl Ensemble {
             let inverse: Vec<C> = elements
                 .map(|e| C::new(m.values[9 * size + e], m.values[10 * size + e]))
                 .collect();
-            // A singular mean leaves the NaN in place.
+            // If the mean is singular, the NaN stays in place.
             let _ = solver.invert(&inverse, mean);
         }
         out

@@ -1,9 +1,10 @@
-//! Inverses of 3x3 matrices by cofactors, where that is as good as elimination.
+//! Inverses of 3x3 matrices by cofactors, where these are as accurate as elimination.
 //!
-//! A cofactor is rounded by about `eps |A|^2`, so with `R = |A|^2 / |adj A|` (which is the
-//! first over the second singular value, no more than a small factor away) the residual
-//! `|A X - 1|` is a few `eps R |A| |X|`; the rounding of the determinant adds no more. Small R
-//! therefore means residuals as after pivoting, whatever the condition number.
+//! The rounding error of a cofactor is about `eps |A|^2`. Let `R = |A|^2 / |adj A|`, which is
+//! within a small factor of the ratio of the first two singular values. The residual `|A X - 1|` is
+//! then a few `eps R |A| |X|`, and the rounding of the determinant adds no more. A small `R`
+//! therefore gives residuals as small as those of elimination with pivoting, whatever the condition
+//! number.
 
 use super::pair::Pair;
 use axisight_scalar::{MOST_LANES, Register};
@@ -11,16 +12,16 @@ use nalgebra::Complex;
 
 type C = Complex<f64>;
 
-/// Largest `|A|^2 / |adj A|` in Frobenius norms; at least 1.7.
+/// Largest accepted `|A|^2 / |adj A|` in Frobenius norms. The ratio is at least 1.7.
 const LARGEST_RATIO: f64 = 6.0;
 
-/// Smallest `|det A| / (|A| |adj A|)`: far from what counts as singular.
+/// Smallest accepted `|det A| / (|A| |adj A|)`, far above the value of a singular matrix.
 const SMALLEST_DETERMINANT: f64 = 1e-12;
 
-/// Squared norms between which no product overflows or vanishes.
+/// Range of squared norms in which no product overflows or vanishes.
 const SQUARES: (f64, f64) = (1e-80, 1e80);
 
-/// Inverses of `R::LANES` matrices; the lanes of the result are above zero where they are good.
+/// Inverses of `R::LANES` matrices; a lane of the result is above zero if its inverse is accurate.
 #[inline(always)]
 pub(super) fn invert<R: Register>(a: &[C], out: &mut [C]) -> R {
     let zero = R::splat(0.0);
@@ -61,7 +62,7 @@ pub(super) fn invert<R: Register>(a: &[C], out: &mut [C]) -> R {
     ratio.if_positive(regular.if_positive(good, zero), zero)
 }
 
-/// Note the places, from `first` on, that are not good.
+/// Append the places of the inaccurate inverses to `later`, counted from `first`.
 #[inline(always)]
 pub(super) fn leave<R: Register>(good: R, first: usize, later: &mut Vec<usize>) {
     let mut lanes = [0.0; MOST_LANES];

@@ -1,17 +1,18 @@
-//! Memory asked for before it is needed: a batch walks through more than a cache holds, in
-//! steps that the processor's own prediction does not follow.
+//! Prefetching of memory for batches that are larger than the cache.
+//!
+//! The processor does not predict the steps in which such a batch is read.
 
 use nalgebra::Complex;
 
 type C = Complex<f64>;
 
-/// Bytes of a line of the cache.
+/// Bytes of a cache line.
 const LINE: usize = 64;
 
-/// Numbers in it.
+/// Complex numbers in a cache line.
 const NUMBERS: usize = LINE / size_of::<C>();
 
-/// The next pieces of what is read and of what is written.
+/// The next parts of the input and of the output.
 pub(super) struct Ahead<'a> {
     from: &'a [C],
     to: &'a [C],
@@ -22,12 +23,12 @@ impl<'a> Ahead<'a> {
         Self { from, to }
     }
 
-    /// Nothing to ask for.
+    /// Prefetch nothing.
     pub(super) fn nothing() -> Self {
         Self { from: &[], to: &[] }
     }
 
-    /// Ask for the next `lines` lines of both.
+    /// Prefetch the next `lines` cache lines of input and output.
     #[inline(always)]
     pub(super) fn ask(&mut self, lines: usize) {
         for list in [&mut self.from, &mut self.to] {
@@ -44,7 +45,7 @@ impl<'a> Ahead<'a> {
 #[inline(always)]
 fn fetch(line: &[C]) {
     use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-    // SAFETY: a hint, harmless at any address.
+    // SAFETY: a prefetch is a hint and harmless at any address.
     #[allow(unsafe_code)]
     unsafe {
         _mm_prefetch::<_MM_HINT_T0>(line.as_ptr().cast());

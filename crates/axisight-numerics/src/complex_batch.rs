@@ -1,8 +1,10 @@
-//! Many small complex matrices at a time: several in lock-step, one per lane of the widest
-//! registers that the processor has. The result has the same bits at any width.
+//! Inversion and division of many small complex matrices.
 //!
-//! Elimination with pivoting, see `lockstep_lu`; 3x3 inverses by cofactors where those are as
-//! good, see `adjugate`.
+//! Several matrices are computed in lock-step, one per lane of the widest registers that the
+//! processor has. The result has the same bits at any width.
+//!
+//! The method is elimination with pivoting, see `lockstep_lu`. 3x3 inverses use cofactors where
+//! these are as accurate, see `adjugate`.
 
 use super::SmallSolver;
 use super::adjugate;
@@ -16,33 +18,33 @@ use rayon::prelude::*;
 
 type C = Complex<f64>;
 
-/// Registers of every processor that the package runs on.
+/// Registers that every supported processor has.
 type Narrow = Lanes<4>;
 
 /// Matrices of one parallel task: enough to hide the hand-over, few enough for the cache.
 const TASK: usize = 512;
 
-/// Largest size with a kernel of its own.
+/// Largest size that has a kernel of its own.
 const LARGEST: usize = 8;
 
-/// Who does the work of a batch; the result is the same.
+/// The threads that compute a batch. The result does not depend on them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Threads {
     /// The calling thread.
     This,
-    /// Those of the current pool.
+    /// The threads of the current pool.
     Pool,
 }
 
-/// Shapes that do not fit together.
+/// Error: an argument has the wrong number of entries.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: expected {expected} numbers, got {got}")]
 pub struct BatchShapeError {
-    /// Argument.
+    /// Name of the argument.
     pub field: &'static str,
-    /// Numbers it should hold.
+    /// Expected number of entries.
     pub expected: usize,
-    /// Numbers it holds.
+    /// Actual number of entries.
     pub got: usize,
 }
 
@@ -57,14 +59,16 @@ fn check(field: &'static str, got: usize, expected: usize) -> Result<(), BatchSh
     })
 }
 
-/// Inverses of `count` row-major matrices of `n` rows into `out`; true for each that is
-/// singular to working precision or not finite. Those inverses are NaN.
+/// Write the inverses of `count` row-major matrices of `n` rows into `out`.
 ///
-/// Singular means that a pivot is at most `4 n 2^-52` of the largest entry of its column, rows
-/// scaled to about one: units of rows and columns do not matter.
+/// Returns one flag a matrix: true if the matrix is singular to working precision or not finite.
+/// The inverse of a flagged matrix is NaN.
+///
+/// A matrix is singular if a pivot is at most `4 n 2^-52` of the largest entry of its column, with
+/// rows scaled to about one. The units of rows and columns therefore do not matter.
 ///
 /// # Errors
-/// [`BatchShapeError`] where `matrices` or `out` do not hold `count n n` numbers.
+/// [`BatchShapeError`] if `matrices` or `out` do not hold `count n n` numbers.
 pub fn invert_batch(
     matrices: &[C],
     n: usize,
@@ -104,11 +108,13 @@ fn invert_task(n: usize, a: &[C], out: &mut [C], singular: &mut [bool]) {
     }
 }
 
-/// `Y U^-1` for `count` pairs, `y` of shape `(count, rows, n)` and `u` of `(count, n, n)`, into
-/// `out`; flags as for [`invert_batch`].
+/// Write `Y U^-1` for `count` pairs into `out`, with `y` of shape `(count, rows, n)` and `u` of
+/// shape `(count, n, n)`.
+///
+/// Returns flags as [`invert_batch`] does.
 ///
 /// # Errors
-/// [`BatchShapeError`] where `y`, `u` or `out` do not have these shapes.
+/// [`BatchShapeError`] if `y`, `u` or `out` do not have these shapes.
 pub fn right_divide_batch(
     y: &[C],
     u: &[C],
@@ -183,13 +189,13 @@ fn divide_large(n: usize, y: &[C], u: &[C], rows: usize, out: &mut [C], singular
     }
 }
 
-/// Two entries to one kernel: compiled for wide registers and for the others.
+/// Two entries to one kernel: one compiled for wide registers, one for narrow registers.
 macro_rules! widest {
     ($name:ident, $wide:ident, $kernel:ident, ($($argument:ident: $type:ty),+)) => {
         fn $name<const N: usize>($($argument: $type),+) {
             #[cfg(target_arch = "x86_64")]
             if wide::available() {
-                // SAFETY: the processor has the instructions.
+                // SAFETY: `available` has checked that the processor has the instructions.
                 #[allow(unsafe_code)]
                 return unsafe { $wide::<N>($($argument),+) };
             }
@@ -228,7 +234,7 @@ fn invert_lanes<R: Register, const N: usize>(a: &[C], out: &mut [C], singular: &
         let (out, to) = left.1.split_at_mut(group);
         let first = g * R::LANES;
         if N == 3 {
-            // Quickly done: what is asked for must be a few groups off.
+            // A group takes so little time that the prefetch must be two groups ahead.
             let skipped = (2 * group).min(from.len());
             let next = skipped + group.min(from.len() - skipped);
             Ahead::new(&from[skipped..next], &to[skipped..next]).ask(group);
@@ -243,7 +249,7 @@ fn invert_lanes<R: Register, const N: usize>(a: &[C], out: &mut [C], singular: &
     let (mut from, mut to) = (vec![C::default(); group], vec![C::default(); group]);
     let whole = singular.len() / R::LANES * R::LANES;
     if N == 3 && whole < singular.len() {
-        // By the same way as a whole group: neighbours must not change a result.
+        // The rest takes the same path as a whole group, so that neighbours never change a result.
         let tail = &a[whole * size..];
         from[..tail.len()].copy_from_slice(tail);
         let good = adjugate::invert::<R>(&from, &mut to);
@@ -297,7 +303,7 @@ fn divide_lanes<R: Register, const N: usize>(
     }
 }
 
-/// Flag the bad lanes and make their results NaN.
+/// Flag the lanes above zero in `bad` and set their results to NaN.
 #[inline(always)]
 fn finish<R: Register>(bad: R, size: usize, out: &mut [C], singular: &mut [bool]) {
     let mut lanes = [0.0; MOST_LANES];
@@ -315,7 +321,7 @@ fn finish<R: Register>(bad: R, size: usize, out: &mut [C], singular: &mut [bool]
 mod tests {
     use super::*;
 
-    /// Entries of a reproducible mess, some matrices singular or badly scaled.
+    /// Reproducible pseudo-random matrices, some of them singular or badly scaled.
     fn matrices(n: usize, count: usize) -> Vec<C> {
         let entry = |i: usize| C::new((i as f64 * 0.7).sin(), (i as f64 * 1.3).cos());
         let mut all: Vec<C> = (0..count * n * n).map(|i| entry(i * i)).collect();
@@ -325,7 +331,7 @@ mod tests {
     }
 
     fn bits(x: &[C]) -> Vec<(u64, u64)> {
-        // One NaN is as good as another.
+        // All NaNs count as equal, whatever their bits.
         let bits = |x: f64| if x.is_nan() { 0 } else { x.to_bits() };
         x.iter().map(|c| (bits(c.re), bits(c.im))).collect()
     }
@@ -354,14 +360,14 @@ mod tests {
         same_bits::<6>();
     }
 
-    /// What stands beside a matrix does not change its inverse.
+    /// The neighbours of a matrix in the batch do not change its inverse.
     #[test]
     fn neighbours_do_not_matter() {
         let a = matrices(3, 24);
         let mut all = a.clone();
         invert_batch(&a, 3, 24, &mut all, Threads::This).ok();
         for (a, expected) in a.chunks_exact(9).zip(all.chunks_exact(9)) {
-            // Eight copies, of which every one takes the path of a whole group.
+            // With eight copies, every matrix takes the path of a whole group.
             let eight = a.repeat(8);
             let mut out = eight.clone();
             invert_batch(&eight, 3, 8, &mut out, Threads::This).ok();

@@ -1,15 +1,15 @@
-//! Small dense complex systems, many at a time; singular ones are reported, never divided by.
+//! Small dense complex systems, many at a time. Singular systems are reported.
 
 use nalgebra::Complex;
 
 type C = Complex<f64>;
 
-/// Smallest pivot of a row scaled to one that counts as different from zero: what rounding
-/// leaves of a dependent row is near 1e-15, and simulated records add some hundred times
-/// that.
+/// Smallest pivot that counts as non-zero, for rows scaled to one.
+///
+/// Rounding leaves about 1e-15 of a dependent row. Simulated records raise this a hundredfold.
 const SMALLEST_PIVOT: f64 = 1e-12;
 
-/// Scratch for systems of one size.
+/// Solver with scratch memory for systems of one size.
 #[derive(Debug, Clone)]
 pub struct SmallSolver {
     n: usize,
@@ -18,7 +18,7 @@ pub struct SmallSolver {
 }
 
 impl SmallSolver {
-    /// For square matrices of `n` rows.
+    /// A solver for square matrices of `n` rows.
     pub fn new(n: usize) -> Self {
         Self {
             n,
@@ -27,11 +27,13 @@ impl SmallSolver {
         }
     }
 
-    /// `out = y u^-1`, all row-major `(n, n)`. False, with `out` untouched, where `u` is
-    /// singular to working precision or anything is not finite.
+    /// Compute `out = y u^-1`, all row-major `(n, n)`.
+    ///
+    /// Returns false and leaves `out` unchanged if `u` is singular to working precision or an entry
+    /// is not finite.
     pub fn right_divide(&mut self, y: &[C], u: &[C], out: &mut [C]) -> bool {
         let n = self.n;
-        // x u = y is u' x' = y'.
+        // `x u = y` is the same system as `u' x' = y'`.
         for i in 0..n {
             for j in 0..n {
                 self.matrix[j * n + i] = u[i * n + j];
@@ -49,7 +51,8 @@ impl SmallSolver {
         solved
     }
 
-    /// `out = a^-1`; false where `a` is singular, as for [`SmallSolver::right_divide`].
+    /// Compute `out = a^-1`, row-major `(n, n)`; returns false as [`SmallSolver::right_divide`]
+    /// does.
     pub fn invert(&mut self, a: &[C], out: &mut [C]) -> bool {
         let n = self.n;
         self.matrix.copy_from_slice(a);

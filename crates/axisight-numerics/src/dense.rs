@@ -1,4 +1,4 @@
-//! Dense real matrices: eigenvalues with vectors, and large positive definite systems.
+//! Dense real matrices: eigenvalues with eigenvectors, and large positive definite systems.
 
 use faer::prelude::Solve;
 use faer::{MatRef, Side};
@@ -8,7 +8,7 @@ type C = Complex<f64>;
 
 /// Eigenvalues and eigenvectors (columns) of a square real matrix, in matching order.
 ///
-/// `None` if the iteration does not converge: the matrix has entries that are not finite.
+/// Returns `None` if the iteration does not converge, which means that an entry is not finite.
 pub fn eigen(matrix: &DMatrix<f64>) -> Option<(Vec<C>, DMatrix<C>)> {
     let eigen = view(matrix).eigen().ok()?;
     let (values, vectors) = (eigen.S().column_vector(), eigen.U());
@@ -20,8 +20,10 @@ pub fn eigen(matrix: &DMatrix<f64>) -> Option<(Vec<C>, DMatrix<C>)> {
     ))
 }
 
-/// Solution of `a x = b` for a symmetric positive definite `a`, of which only the lower half
-/// is read; `None` if it is not positive definite.
+/// Solution of `a x = b` for a symmetric positive definite `a`, of which only the lower half is
+/// read.
+///
+/// Returns `None` if `a` is not positive definite.
 pub fn solve_positive(a: &DMatrix<f64>, b: &[f64]) -> Option<Vec<f64>> {
     let right = MatRef::from_column_major_slice(b, b.len(), 1);
     let solution = view(a).llt(Side::Lower).ok()?.solve(&right);

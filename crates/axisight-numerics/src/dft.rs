@@ -1,15 +1,15 @@
-//! The discrete Fourier transform of periodic records: the one place for its sign and scale.
+//! Discrete Fourier transform of periodic records; sign and scale are defined here only.
 //!
-//! `X_k = 1/sqrt(N) sum_{n=0}^{N-1} x_n exp(-2 pi i k n / N)`, line `k` at frequency
-//! `k / (N T)`. Ljung (1999), section 2.2; Wernholt (2004), (3.16), which counts samples
-//! from one: a common phase that cancels in every response.
+//! `X_k = 1/sqrt(N) sum_{n=0}^{N-1} x_n exp(-2 pi i k n / N)`, with line `k` at the frequency
+//! `k / (N T)`. See Ljung (1999), section 2.2. Wernholt (2004), (3.16), counts samples from one,
+//! which adds a common phase that cancels in every response.
 
 use crate::plan::plan;
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftDirection};
 use std::sync::Arc;
 
-/// Plans for records of one length; cheap to clone, shared between threads.
+/// Plans for records of one length. They are cheap to clone and shared between threads.
 #[derive(Clone)]
 pub struct Dft {
     forward: Arc<dyn Fft<f64>>,
@@ -30,7 +30,7 @@ impl std::fmt::Debug for Dft {
 }
 
 impl Dft {
-    /// For records of `n` samples.
+    /// A plan for records of `n` samples.
     pub fn new(n: usize) -> Self {
         Self {
             forward: plan(n, FftDirection::Forward),
@@ -48,9 +48,9 @@ impl Dft {
         self.len() == 0
     }
 
-    /// Lines `1 <= k <= N/2` of two real records at once: sample `n` is `(a_n, b_n)`.
+    /// Lines `1 <= k <= N/2` of two real records at once, with `(a_n, b_n)` as sample `n`.
     ///
-    /// Both go through one complex transform of `a + i b` and are told apart by symmetry.
+    /// One complex transform of `a + i b` serves both records; symmetry separates them.
     pub fn pair(
         &self,
         samples: impl Iterator<Item = (f64, f64)>,

@@ -1,5 +1,5 @@
-//! Fourier transforms of several columns in lock-step, one per lane: no butterfly ever mixes
-//! lanes. Stockham's ordering, passes of radix 2, 3, 4 and 5.
+//! Fourier transforms of several columns in lock-step, one column per lane, so that no butterfly
+//! mixes lanes. Stockham's ordering, with passes of radix 2, 3, 4 and 5.
 
 use super::pair::Pair;
 use axisight_scalar::Register;
@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 type C = Complex<f64>;
 
-/// Rows of columns to transform.
+/// A matrix whose columns are transformed.
 pub(super) trait Rows<R> {
     /// The columns of a row.
     fn at(&self, row: usize) -> Pair<R>;
@@ -21,7 +21,7 @@ impl<R: Register> Rows<R> for &[Pair<R>] {
     }
 }
 
-/// Two real matrices, `step` columns wide, as real and imaginary parts.
+/// Two real matrices with rows of `step` numbers, taken as real and imaginary parts.
 pub(super) struct TwoReal<'a> {
     pub(super) a: &'a [f64],
     pub(super) b: &'a [f64],
@@ -43,10 +43,10 @@ impl<R: Register> Rows<R> for TwoReal<'_> {
 #[derive(Debug, Clone)]
 struct Pass {
     radix: usize,
-    /// Butterflies with the same twiddles, and how many such sets.
+    /// Number of butterflies with the same twiddles.
     stride: usize,
     sets: usize,
-    /// `(set, 1..radix)`.
+    /// Twiddles, `(set, 1..radix)`.
     twiddles: Vec<C>,
 }
 
@@ -56,7 +56,7 @@ pub(super) struct LaneFft {
     passes: Vec<Pass>,
 }
 
-/// Radices of a length, `None` where it has a prime factor above five.
+/// Radices of a length, or `None` if the length has a prime factor above five.
 fn radices(mut length: usize) -> Option<Vec<usize>> {
     let mut found = Vec::new();
     for radix in [5, 4, 3, 2] {
@@ -68,7 +68,7 @@ fn radices(mut length: usize) -> Option<Vec<usize>> {
     (length == 1).then_some(found)
 }
 
-/// Vector instructions for each row of a transform of this length, roughly; `None` as for
+/// Approximate number of vector instructions per row for a transform of this length; `None` as for
 /// [`LaneFft::new`].
 pub(super) fn cost_per_row(length: usize) -> Option<f64> {
     let cost = |radix: usize| match radix {
@@ -81,7 +81,7 @@ pub(super) fn cost_per_row(length: usize) -> Option<f64> {
 }
 
 impl LaneFft {
-    /// `None` where the length has a prime factor above five.
+    /// A plan for `length` rows, or `None` if the length has a prime factor above five.
     pub(super) fn new(length: usize) -> Option<Self> {
         let mut left = length;
         let passes = radices(length)?.into_iter().map(|radix| {
@@ -104,7 +104,7 @@ impl LaneFft {
         })
     }
 
-    /// `X_k = sum_j x_j exp(-2 pi i j k / length)` of every column; the result is in one of
+    /// `X_k = sum_j x_j exp(-2 pi i j k / length)` of every column. The returned slice is one of
     /// the two work spaces.
     #[inline(always)]
     pub(super) fn transform<'w, R: Register>(
@@ -154,7 +154,7 @@ impl Pass {
                 butterfly(&mut x);
                 out[q] = x[0];
                 for j in 1..N {
-                    // The twiddles of the only set are one.
+                    // All twiddles of a single set are one.
                     out[q + stride * j] = if sets == 1 {
                         x[j]
                     } else {

@@ -1,11 +1,10 @@
-//! Numerics with concrete types: Fourier transforms, eigenvalues, small complex systems in
-//! batches, weighting of residuals over frequency, and the search for least squares.
+//! Numerics with concrete types: Fourier transforms, eigenvalues, batches of small complex systems,
+//! weighting of residuals over frequency, and least squares.
 //!
-//! A crate of its own because generic libraries are compiled where they are used with a type:
-//! rustfft and faer are used here and nowhere else, so that a change anywhere above builds
-//! neither of them again.
+//! Generic libraries are compiled where they are used with a concrete type. Only this crate uses
+//! rustfft and faer, so a change in another crate does not build them again.
 
-// Kernels are generic over the scalar and must be inlined to become vector code.
+// Kernels are generic over the scalar and become vector code only if they are inlined.
 #![allow(clippy::inline_always)]
 
 mod adjugate;

@@ -1,13 +1,13 @@
-//! DFT of real records of several channels, at chosen lines only.
+//! DFT of real multichannel records at chosen lines only.
 //!
-//! `X_k = sum_n x_n exp(-2 pi i k n / N)` without scale. With `N = D M`, the sum over
-//! `n = D j + d` is a sum over `d` of transforms of `M` samples, `D` apart, turned by
-//! `exp(-2 pi i k d / N)`. `M = N` is the whole FFT, `M = 1` the plain sum; what lies between
-//! pays when the lines are few. `M` is the divisor of `N` with the least work.
+//! `X_k = sum_n x_n exp(-2 pi i k n / N)`, without a scale factor. For `N = D M` and `n = D j + d`,
+//! this is a sum over `d` of transforms of the `M` samples that lie `D` apart, each multiplied by
+//! `exp(-2 pi i k d / N)`. `M = N` is the full FFT and `M = 1` the plain sum. Values between are
+//! cheaper if the lines are few. `M` is the divisor of `N` with the least work.
 //!
-//! Samples of all channels lie side by side, so a record is a matrix of `M` rows whose columns
-//! are all `(d, channel)`: as many columns as a register has lanes are transformed at a time,
-//! as they lie. Two records share a transform, as real and imaginary part.
+//! The samples of all channels lie side by side, so a record is a matrix of `M` rows with one
+//! column for every `(d, channel)`. As many columns as a register has lanes are transformed at a
+//! time, without copying. Two records share a transform, as its real and imaginary parts.
 
 use super::lane_fft::{LaneFft, Rows, TwoReal, cost_per_row};
 use super::pair::Pair;
@@ -22,13 +22,13 @@ use std::sync::Arc;
 
 type C = Complex<f64>;
 
-/// Registers of every processor that the package runs on.
+/// Registers that every supported processor has.
 type Narrow = Lanes<4>;
 
-/// Vector instructions to turn one line of as many columns as there are lanes.
+/// Cost to twiddle one line of one register of columns [vector instructions].
 const TURN: f64 = 14.0;
 
-/// The same for a row of a transform of a length with large prime factors, lane by lane.
+/// The same for a row of a transform whose length has large prime factors, lane by lane.
 const LANE_BY_LANE: f64 = 250.0;
 
 /// A plan for records of one length and one set of lines.
@@ -37,7 +37,7 @@ pub struct LineDft {
     engine: Engine,
 }
 
-/// As wide as the processor allows.
+/// A plan for the widest registers that the processor has.
 #[derive(Debug, Clone)]
 enum Engine {
     Narrow(Plan<Narrow>),
@@ -55,7 +55,7 @@ pub struct LineDftScratch {
 }
 
 impl LineDft {
-    /// For records of `n` samples of `channels`, at `lines` (modulo `n`).
+    /// A plan for records of `n` samples of `channels`, at `lines` (modulo `n`).
     pub fn new(n: usize, channels: usize, lines: &[usize]) -> Self {
         #[cfg(target_arch = "x86_64")]
         if wide::available() {
@@ -68,10 +68,11 @@ impl LineDft {
         Self { engine }
     }
 
-    /// Lines of two records, `n` samples of all channels each, as pairs over (line, channel);
-    /// after the lines asked for comes line 0, the sum of the samples.
+    /// Lines of two records, as pairs `(line of a, line of b)` over (line, channel).
     ///
-    /// Records of another length, or empty, give nothing.
+    /// Each record holds `n` samples of all channels, `(sample, channel)`. After the requested
+    /// lines comes line 0, the sum of the samples. The result is empty if a record is empty or has
+    /// another length.
     pub fn pair<'w>(&self, a: &[f64], b: &[f64], scratch: &'w mut LineDftScratch) -> &'w [(C, C)] {
         let LineDftScratch { lines, .. } = scratch;
         lines.clear();
@@ -79,7 +80,7 @@ impl LineDft {
             Engine::Narrow(plan) => plan.pair(a, b, &mut scratch.narrow, lines),
             #[cfg(target_arch = "x86_64")]
             Engine::Wide(plan) => {
-                // SAFETY: there is no such plan unless the processor has the instructions.
+                // SAFETY: a wide plan exists only if the processor has the instructions.
                 #[allow(unsafe_code)]
                 unsafe {
                     pair_wide(plan, a, b, &mut scratch.wide, lines);
@@ -102,7 +103,7 @@ fn pair_wide(
     plan.pair(a, b, work, out);
 }
 
-/// Work with transforms of `m` samples.
+/// Work with transforms of `m` samples [vector instructions].
 fn work(n: usize, channels: usize, lines: usize, lanes: usize, m: usize) -> f64 {
     let registers = (n / m * channels).div_ceil(lanes) as f64;
     let transform = cost_per_row(m).unwrap_or(LANE_BY_LANE) * m as f64;
@@ -121,7 +122,7 @@ fn transform_length(n: usize, channels: usize, lines: usize, lanes: usize) -> us
         .unwrap_or(n)
 }
 
-/// Roots of one, `exp(-2 pi i k / n)`, each the product of two from short tables.
+/// Roots of unity, `exp(-2 pi i k / n)`, each the product of two entries of short tables.
 struct Roots {
     n: usize,
     coarse: Vec<C>,
@@ -143,7 +144,7 @@ impl Roots {
         }
     }
 
-    /// The roots of `0, k, 2 k, ...`, reduced before anything is rounded.
+    /// The roots at `0, k, 2 k, ...`, with the exponents reduced modulo `n` before any rounding.
     fn multiples(&self, k: usize, count: usize) -> impl Iterator<Item = C> {
         let k = k % self.n;
         let mut next = 0;
@@ -179,12 +180,12 @@ struct Plan<R> {
     n: usize,
     m: usize,
     channels: usize,
-    /// Columns: `D` times the channels.
+    /// Number of columns: `D` times the channels.
     columns: usize,
     transform: Transform,
-    /// Places of `k` and `-k` modulo `M`.
+    /// Rows of the lines `k` and `-k`, modulo `M`.
     places: Vec<(usize, usize)>,
-    /// `exp(-2 pi i k d / N) / 2` for every column, `(register, line)`.
+    /// `exp(-2 pi i k d / N) / 2` of every column, `(register, line)`.
     turns: Vec<Pair<R>>,
 }
 
@@ -192,11 +193,11 @@ struct Plan<R> {
 struct Work<R> {
     one: Vec<Pair<R>>,
     two: Vec<Pair<R>>,
-    /// Sums over the turned lines and mirror lines, `(arrangement of the channels, line)`.
+    /// Sums over the columns for lines and mirror lines, `(arrangement of the channels, line)`.
     sums: Vec<(Pair<R>, Pair<R>)>,
     /// Columns that do not fill a register, of both records.
     rest: (Vec<f64>, Vec<f64>),
-    /// One lane and the work space of its transform.
+    /// One column and the work space of its transform.
     lane: (Vec<C>, Vec<C>),
 }
 
@@ -255,7 +256,7 @@ impl<R: Register> Plan<R> {
         if a.len() != self.n * self.channels || b.len() != a.len() || a.is_empty() {
             return;
         }
-        // After so many registers the channels come round to the first lane again.
+        // The assignment of channels to lanes repeats after this number of registers.
         let arrangements = (1..=self.channels)
             .find(|r| (r * lanes).is_multiple_of(self.channels))
             .unwrap_or(1);
@@ -320,7 +321,7 @@ impl<R: Register> Plan<R> {
     }
 }
 
-/// Add the lanes to their channels, of which `offset` is the first lane's.
+/// Add each lane to its channel; `offset` is the channel of the first lane.
 #[inline(always)]
 fn gather<R: Register>(sum: &(Pair<R>, Pair<R>), offset: usize, lanes: usize, out: &mut [(C, C)]) {
     let mut numbers = [[C::default(); MOST_LANES]; 2];
@@ -337,7 +338,7 @@ fn gather<R: Register>(sum: &(Pair<R>, Pair<R>), offset: usize, lanes: usize, ou
     }
 }
 
-/// Transform columns of any length, one by one.
+/// Transform columns of any length, one at a time.
 fn lane_by_lane<R: Register>(
     fft: &dyn Fft<f64>,
     rows: &impl Rows<R>,
@@ -348,7 +349,7 @@ fn lane_by_lane<R: Register>(
     lane.resize(m * R::LANES, C::default());
     work.resize(fft.get_inplace_scratch_len(), C::default());
     for row in 0..m {
-        // Lane by lane, `m` numbers each.
+        // Each lane is stored as `m` consecutive numbers.
         rows.at(row).join(&mut lane[row..], m);
     }
     fft.process_with_scratch(lane, work);
@@ -389,7 +390,7 @@ mod tests {
         }
     }
 
-    /// Every way to cut a record, for every width of registers, gives the plain sum.
+    /// Every divisor gives the plain sum, for every register width.
     #[test]
     fn equals_the_plain_sum_for_every_divisor() {
         for channels in [1, 2, 3, 5, 8, 9] {

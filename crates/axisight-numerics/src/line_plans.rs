@@ -1,12 +1,13 @@
-//! Plans used lately: a plan takes longer to make than a few records to transform.
+//! Cache of recent plans: making a plan takes longer than transforming a few records.
 
 use super::LineDft;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Plans kept.
+/// Number of plans that the cache keeps.
 const KEPT: usize = 4;
 
-/// Numbers of a record, samples times channels, above which the work dwarfs the plan.
+/// Largest record (samples times channels) whose plan is kept. For longer records the transform
+/// takes much longer than the plan.
 const LARGEST: usize = 1 << 20;
 
 struct Kept {
@@ -16,10 +17,10 @@ struct Kept {
     plan: Arc<LineDft>,
 }
 
-/// Latest last.
+/// The latest plan comes last.
 static RECENT: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
 
-/// A plan for records of `samples` of `channels`, at `lines`.
+/// A plan for records of `samples` of `channels`, at `lines`, from the cache if possible.
 pub fn line_plan(samples: usize, channels: usize, lines: &[usize]) -> Arc<LineDft> {
     let fits =
         |kept: &Kept| (kept.samples, kept.channels) == (samples, channels) && kept.lines == lines;

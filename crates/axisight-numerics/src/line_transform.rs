@@ -1,7 +1,7 @@
-//! Real records on a fine grid from a few lines of their spectrum, and back.
+//! Transforms between a few spectral lines and real samples on a fine grid.
 //!
-//! A grid of `n` real samples is kept as `n / 2` complex numbers `x_{2m} + i x_{2m+1}`, so
-//! that one complex transform of half the length does each way; only the lines asked for are
+//! A grid of `n` real samples is stored as `n / 2` complex numbers `x_{2m} + i x_{2m+1}`, so that
+//! one complex transform of half the length serves each direction. Only the requested lines are
 //! packed and unpacked. A line `k` with coefficient `d_k` is `Re(d_k exp(2 pi i k j / n))`.
 
 use crate::plan::plan;
@@ -10,8 +10,8 @@ use rustfft::num_traits::Float;
 use rustfft::{Fft, FftDirection, FftNum};
 use std::sync::Arc;
 
-/// A number that grids are made of. Its transforms are compiled here, once, and not wherever
-/// a grid is used.
+/// A number type for grids. Its transforms are compiled in this crate only, not in every crate that
+/// uses a grid.
 pub trait GridNumber: FftNum + Float {
     /// Forward and inverse transform of `n` complex numbers.
     fn transforms(n: usize) -> (Arc<dyn Fft<Self>>, Arc<dyn Fft<Self>>);
@@ -32,7 +32,7 @@ macro_rules! grid_number {
 grid_number!(f32);
 grid_number!(f64);
 
-/// Transforms between lines and a real grid; cheap to clone, shared between threads.
+/// Transforms between lines and a real grid. They are cheap to clone and shared between threads.
 #[derive(Clone)]
 pub struct LineTransform<T> {
     forward: Arc<dyn Fft<T>>,
@@ -53,7 +53,7 @@ pub struct LineGrid<T> {
 impl<T: GridNumber> LineGrid<T> {
     /// Largest absolute sample.
     pub fn peak(&self) -> T {
-        /// Independent maxima, so that the compiler may use vector registers.
+        /// Independent maxima let the compiler use vector registers.
         const LANES: usize = 16;
         let larger = |a: T, b: T| if b > a { b } else { a };
         let mut lanes = [T::zero(); LANES];
@@ -68,7 +68,7 @@ impl<T: GridNumber> LineGrid<T> {
         lanes.into_iter().chain(rest).fold(T::zero(), larger)
     }
 
-    /// Every sample set to `f` of the sample of `other`.
+    /// Set every sample to `f` of the sample of `other`.
     pub fn map_from(&mut self, other: &Self, f: impl Fn(T) -> T) {
         for (to, from) in self.pairs.iter_mut().zip(&other.pairs) {
             *to = Complex::new(f(from.re), f(from.im));
@@ -77,7 +77,8 @@ impl<T: GridNumber> LineGrid<T> {
 }
 
 impl<T: GridNumber> LineTransform<T> {
-    /// For `lines` on a grid of `half` pairs of samples; every line must lie below `half`.
+    /// Transforms for `lines` on a grid of `half` pairs of samples. Every line must be below
+    /// `half`.
     pub fn new(half: usize, lines: &[usize]) -> Self {
         let (forward, inverse) = T::transforms(half);
         let step = std::f64::consts::PI / half as f64;
@@ -99,7 +100,7 @@ impl<T: GridNumber> LineTransform<T> {
         &self.lines
     }
 
-    /// Samples of the grid.
+    /// Number of samples of the grid.
     pub fn samples(&self) -> usize {
         2 * self.forward.len()
     }
@@ -125,7 +126,7 @@ impl<T: GridNumber> LineTransform<T> {
         for ((k, w), d) in self.lines.iter().zip(&self.twiddle).zip(coefficient) {
             let even = d.scale(point5);
             let odd = even * w;
-            // even + i odd, and the mirror line of both.
+            // Even plus i odd samples, and the mirror line of both.
             let here = Complex::new(even.re - odd.im, even.im + odd.re);
             let mirror = Complex::new(even.re + odd.im, odd.re - even.im);
             grid.pairs[k % half] = grid.pairs[k % half] + here;
@@ -136,14 +137,15 @@ impl<T: GridNumber> LineTransform<T> {
             .process_with_scratch(&mut grid.pairs, &mut grid.work);
     }
 
-    /// Coefficients of the lines in `grid`, which is left transformed.
+    /// Coefficients of the lines in `grid`; overwrites the grid with its transform.
     ///
-    /// The inverse of [`Self::synthesize`] on the span of the lines.
+    /// This is the inverse of [`Self::synthesize`] on the span of the lines.
     pub fn analyze(&self, grid: &mut LineGrid<T>, coefficient: &mut [Complex<T>]) {
         let half = self.forward.len();
         self.forward
             .process_with_scratch(&mut grid.pairs, &mut grid.work);
-        // X = E + conj(w) O with E, O the transforms of even and odd samples; d = 2 X / n.
+        // X = E + conj(w) O, where E and O are the transforms of the even and odd samples; d = 2 X
+        // / n.
         let scale = T::from_usize(self.samples()).map_or_else(T::zero, |n| T::one() / n);
         for ((k, w), d) in self.lines.iter().zip(&self.twiddle).zip(coefficient) {
             let here = grid.pairs[k % half];

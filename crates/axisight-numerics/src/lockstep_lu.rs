@@ -1,8 +1,8 @@
 //! LU with partial pivoting of several matrices in lock-step, one per lane.
 //!
-//! Rows are scaled by powers of two, so that scaling rounds nothing; the substitutions are
-//! those of LAPACK's `gesv`, hence its residuals: column `j` of the inverse solves
-//! `A x = e_j`. Exchanges of rows are selections lane by lane.
+//! Rows are scaled by powers of two, which causes no rounding. The substitutions are those of
+//! LAPACK's `gesv`, so the residuals are the same too: column `j` of the inverse solves
+//! `A x = e_j`. Rows are exchanged by selection, lane by lane.
 
 use super::ahead::Ahead;
 use super::pair::Pair;
@@ -11,17 +11,17 @@ use nalgebra::Complex;
 
 type C = Complex<f64>;
 
-/// `P D A = L U`: U above the diagonal, L below (its diagonal is one), the inverses of the
-/// diagonal of U on it.
+/// `P D A = L U`, in one array: U above the diagonal, L below it, the inverses of U's diagonal on
+/// it. The diagonal of L is one.
 pub(super) struct Factors<R, const N: usize> {
     lu: [[Pair<R>; N]; N],
-    /// Scale of the row that has come to each place.
+    /// Scale of the row at each place.
     scale: [R; N],
-    /// Which row has come to each place.
+    /// Original index of the row at each place.
     row: [R; N],
     /// Above zero where the matrix is singular.
     singular: R,
-    /// Zero times every result: zero where all are finite.
+    /// Zero times every result: zero if all results are finite, otherwise NaN.
     spoiled: R,
 }
 
@@ -38,8 +38,8 @@ impl<R: Register, const N: usize> Factors<R, N> {
         }
     }
 
-    /// Inverses of `R::LANES` matrices; the lanes of the result are above zero where a matrix
-    /// is singular or not finite.
+    /// Inverses of `R::LANES` matrices; a lane of the result is above zero if its matrix is
+    /// singular or not finite.
     #[inline(always)]
     pub(super) fn invert(&mut self, a: &[C], out: &mut [C], mut ahead: Ahead<'_>) -> R {
         for i in 0..N {
@@ -47,11 +47,11 @@ impl<R: Register, const N: usize> Factors<R, N> {
                 self.lu[i][j] = Pair::split(&a[i * N + j..], N * N);
             }
         }
-        // As many lines of the next group with each row: N of each of R::LANES N^2 / 4.
+        // Each row prefetches its share of the next group of R::LANES N^2 / 4 cache lines.
         let lines = (R::LANES * N).div_ceil(12);
         self.factor(|| ahead.ask(lines));
-        // All columns at a time: one load of L or U serves N products. Row i of the right
-        // side is scale e_c, c the row that has come to place i.
+        // All columns at a time, so that one load of L or U serves N products. Row i of the right
+        // side is scale e_c, where c is the original index of the row at place i.
         let zero = R::splat(0.0);
         let mut x = [[Pair::zero(); N]; N];
         for i in 0..N {
@@ -91,10 +91,11 @@ impl<R: Register, const N: usize> Factors<R, N> {
         self.bad()
     }
 
-    /// `Y U^-1` for `R::LANES` pairs, `rows` rows in each Y; lanes as for `invert`.
+    /// `Y U^-1` for `R::LANES` pairs with `rows` rows in each Y; the result flags lanes as `invert`
+    /// does.
     #[inline(always)]
     pub(super) fn right_divide(&mut self, y: &[C], u: &[C], rows: usize, out: &mut [C]) -> R {
-        // g u = y is u' g' = y'.
+        // `g u = y` is the same system as `u' g' = y'`.
         for i in 0..N {
             for j in 0..N {
                 self.lu[i][j] = Pair::split(&u[j * N + i..], N * N);
@@ -105,7 +106,7 @@ impl<R: Register, const N: usize> Factors<R, N> {
         for (row, places) in self.row.iter().zip(&mut places) {
             let mut numbers = [0.0; MOST_LANES];
             row.store(&mut numbers);
-            // Whole numbers below N, also where the entries are NaN.
+            // The numbers are whole and below N, even if the entries are NaN.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             for (place, number) in places.iter_mut().zip(numbers) {
                 *place = number as usize;
@@ -141,7 +142,7 @@ impl<R: Register, const N: usize> Factors<R, N> {
         self.bad()
     }
 
-    /// Factor what stands in `lu`; `between` is done before each column.
+    /// Factor the matrix in `lu`; `between` runs before each column.
     #[inline(always)]
     fn factor(&mut self, mut between: impl FnMut()) {
         let zero = R::splat(0.0);
@@ -179,7 +180,7 @@ impl<R: Register, const N: usize> Factors<R, N> {
         }
     }
 
-    /// Bring the largest entry of column `k` from row `k` on to row `k`.
+    /// Move the largest entry of column `k`, from row `k` downwards, to row `k`.
     #[inline(always)]
     fn pivot(&mut self, k: usize) {
         let mut size = self.lu[k][k].square();

@@ -1,4 +1,4 @@
-//! A complex number in every lane of two registers.
+//! Complex numbers in the lanes of two registers.
 
 use axisight_scalar::Register;
 use nalgebra::Complex;
@@ -26,7 +26,7 @@ impl<R: Register> Pair<R> {
         }
     }
 
-    /// Numbers `step` apart.
+    /// The `LANES` numbers that lie `step` apart in `from`.
     #[inline(always)]
     pub(super) fn split(from: &[Complex<f64>], step: usize) -> Self {
         let (re, im) = R::split(from, step);

@@ -1,27 +1,28 @@
-//! Plans of Fourier transforms, kept: a plan takes as long as several transforms.
+//! Cache of FFT plans: making a plan takes as long as several transforms.
 //!
-//! The general planner of rustfft brings its scalar algorithms along, two thirds of what it
-//! compiles to; crates here are built for processors that never run them.
+//! The general planner of rustfft would add its scalar algorithms, two thirds of the compiled code.
+//! The processors for which these crates are built never run them.
 
 use rustfft::{Fft, FftDirection, FftNum};
 use std::any::{Any, TypeId};
 use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-/// Number type, length, and whether forward.
+/// Number type, length, and whether the transform is forward.
 type Key = (TypeId, usize, bool);
-/// An `Arc<dyn Fft<T>>` each.
+/// Each entry is an `Arc<dyn Fft<T>>`.
 type Plans = HashMap<Key, Box<dyn Any + Send + Sync>>;
 
 static PLANS: LazyLock<Mutex<Plans>> = LazyLock::new(Mutex::default);
 
-/// Plans kept; a job rarely has more lengths, and one of a long record takes megabytes.
+/// Number of plans that the cache keeps. A job rarely needs more lengths, and a plan for a long
+/// record takes megabytes.
 const MOST_PLANS: usize = 32;
 
 /// The transform of `n` complex numbers.
 pub(crate) fn plan<T: FftNum>(n: usize, direction: FftDirection) -> Arc<dyn Fft<T>> {
     let key = (TypeId::of::<T>(), n, direction == FftDirection::Forward);
-    // A thread that panicked has left whole plans behind.
+    // A thread that panicked cannot leave a partial plan behind.
     let known = |plans: &Plans| plans.get(&key)?.downcast_ref::<Arc<dyn Fft<T>>>().cloned();
     if let Some(found) = known(&PLANS.lock().unwrap_or_else(PoisonError::into_inner)) {
         return found;
@@ -39,7 +40,7 @@ pub(crate) fn plan<T: FftNum>(n: usize, direction: FftDirection) -> Arc<dyn Fft<
 fn make<T: FftNum>(n: usize, direction: FftDirection) -> Arc<dyn Fft<T>> {
     match rustfft::FftPlannerAvx::new() {
         Ok(mut planner) => planner.plan_fft(n, direction),
-        // Slow and right, where the rest of this build would not run at all.
+        // Slow but correct on processors without the vector instructions of this build.
         Err(()) => Arc::new(rustfft::algorithm::Dft::new(n, direction)),
     }
 }
@@ -54,7 +55,7 @@ mod tests {
     use super::*;
     use rustfft::num_complex::Complex;
 
-    /// Lengths that no other test of this crate asks for.
+    /// No other test of this crate uses these lengths.
     const LENGTHS: [usize; 3] = [691, 720, 1033];
     const DIRECTIONS: [FftDirection; 2] = [FftDirection::Forward, FftDirection::Inverse];
 
@@ -66,7 +67,8 @@ mod tests {
         series
     }
 
-    /// Bit for bit, also where plans of the other direction, number type and length are known.
+    /// The results are bit-identical, even if the cache holds plans of other directions, types and
+    /// lengths.
     #[test]
     fn a_kept_plan_does_what_a_new_one_does() {
         for _ in 0..2 {
@@ -82,7 +84,7 @@ mod tests {
         }
     }
 
-    /// Threads that use one plan at once do not disturb each other; no thread makes it anew.
+    /// Threads can use one plan at the same time, and none makes the plan again.
     #[test]
     fn threads_share_a_plan_and_few_are_kept() {
         let (n, direction) = (947, FftDirection::Forward);
@@ -100,7 +102,7 @@ mod tests {
             threads.into_iter().filter_map(|t| t.join().ok()).collect()
         });
         assert_eq!(done, [(true, true); 4]);
-        // A job that goes through many lengths does not keep them all; here, as it forgets `first`.
+        // The cache does not keep all lengths of a job; here it drops `first`.
         for n in 2..2 * MOST_PLANS {
             plan::<f64>(n, direction);
             let kept = PLANS.lock().expect("no thread has panicked").len();

@@ -1,30 +1,30 @@
 //! Pseudo-inverse of a small wide complex matrix by one-sided Jacobi rotations.
 //!
-//! Demmel and Veselic (1992): every singular value is found to full relative accuracy as far
-//! as the scaling of the rows allows; rows are scaled to unit norm first.
+//! Demmel and Veselic (1992): the relative accuracy of every singular value depends only on the
+//! scaling of the rows, so rows are first scaled to unit norm.
 
 use nalgebra::Complex;
 
 type C = Complex<f64>;
 
-/// Sweeps over all pairs; quadratic convergence takes five or six.
+/// Largest number of sweeps over all pairs. Convergence is quadratic and takes five or six sweeps.
 const SWEEPS: usize = 40;
 
-/// Pseudo-inverses of matrices of one shape.
+/// Solver for matrices of one shape.
 #[derive(Debug, Clone)]
 pub struct PseudoInverse {
     rows: usize,
     columns: usize,
-    /// Conjugate of each row, turned until all are orthogonal: `(row, column)`.
+    /// The conjugated rows, rotated until all are orthogonal, `(row, column)`.
     turned: Vec<C>,
-    /// The turns, column by column.
+    /// The accumulated rotations, column by column.
     turns: Vec<C>,
     squares: Vec<f64>,
     scale: Vec<f64>,
 }
 
 impl PseudoInverse {
-    /// For matrices of `rows` by `columns`, not more rows than columns.
+    /// A solver for matrices of `rows` by `columns`, with at most as many rows as columns.
     pub fn new(rows: usize, columns: usize) -> Self {
         Self {
             rows,
@@ -36,14 +36,16 @@ impl PseudoInverse {
         }
     }
 
-    /// `out = a^+`, `(columns, rows)` row-major, from `a`, `(rows, columns)`; returns the
-    /// smallest and largest singular value of `a` with rows scaled to unit norm. `out` is
-    /// only finite where the smallest is above zero.
+    /// Compute `out = a^+` with shape `(columns, rows)` from `a` with shape `(rows, columns)`, both
+    /// row-major.
+    ///
+    /// Returns the smallest and largest singular value of `a` with rows scaled to unit norm. `out`
+    /// is finite only if the smallest is above zero.
     pub fn compute(&mut self, a: &[C], out: &mut [C]) -> (f64, f64) {
         let (m, e) = (self.rows, self.columns);
         for i in 0..m {
             let row = &a[i * e..(i + 1) * e];
-            // Largest first: squares of small numbers would vanish.
+            // Divide by the largest entry first, because squares of small numbers would underflow.
             let largest = row
                 .iter()
                 .map(|x| x.re.abs().max(x.im.abs()))
@@ -93,7 +95,7 @@ impl PseudoInverse {
         )
     }
 
-    /// Make vectors `p` and `q` orthogonal; false where they are.
+    /// Rotate vectors `p` and `q` to be orthogonal. Returns false if they already are.
     fn turn(&mut self, p: usize, q: usize) -> bool {
         let e = self.columns;
         let (above, below) = self.turned.split_at(q * e);
@@ -101,7 +103,7 @@ impl PseudoInverse {
         let alpha: f64 = a.iter().map(Complex::norm_sqr).sum();
         let beta: f64 = b.iter().map(Complex::norm_sqr).sum();
         let product: C = a.iter().zip(b).map(|(a, b)| a.conj() * b).sum();
-        // Rows have unit norm, so that nothing here overflows: no need of `hypot`.
+        // Rows have unit norm, so nothing overflows and `hypot` is not needed.
         let size = product.norm_sqr().sqrt();
         let orthogonal = size <= f64::EPSILON * (alpha * beta).sqrt();
         if orthogonal || !size.is_finite() || size < f64::MIN_POSITIVE {

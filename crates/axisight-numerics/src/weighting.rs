@@ -1,9 +1,9 @@
 //! Zero-phase weighting of a series over frequency, with decimation.
 //!
-//! The series is continued by reflection (so that its ends make no step),
-//! transformed, multiplied by a real weight and brought back at a lower rate.
-//! White input of variance `s^2` weighted by `1/s` comes out with variance one,
-//! whatever the decimation. Cost: two transforms, `O(n log n)`.
+//! The series is extended by reflection, so that its ends make no step. It is then transformed,
+//! multiplied by a real weight, and transformed back at a lower rate. White input of variance `s^2`
+//! with weight `1/s` has an output of variance one, whatever the decimation. The cost is two
+//! transforms, `O(n log n)`.
 
 use crate::plan::plan;
 use rustfft::num_complex::Complex;
@@ -17,23 +17,23 @@ pub struct Weighting {
     pub frequency_hz: Vec<f64>,
     /// Weights at those frequencies; linear in between, constant outside.
     pub weight: Vec<f64>,
-    /// Output keeps one sample of this many; nothing above its Nyquist frequency passes.
+    /// Keep one output sample of this many. Nothing above the new Nyquist frequency passes.
     pub decimation: usize,
 }
 
-/// A weighting that cannot be applied.
+/// Error: a weighting has an invalid field.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("weighting: {field}: expected {expected}, got {got}")]
 pub struct WeightingError {
-    /// Field.
+    /// Name of the field.
     pub field: &'static str,
-    /// What it should be.
+    /// Expected value.
     pub expected: &'static str,
-    /// What came.
+    /// Actual value.
     pub got: String,
 }
 
-/// Transforms for one series length.
+/// A weighting with its transforms, for one series length.
 pub struct Weighter {
     kept: usize,
     decimation: usize,
@@ -52,10 +52,10 @@ impl Weighting {
         }
     }
 
-    /// Check the table.
+    /// Check frequencies, weights and decimation.
     ///
     /// # Errors
-    /// [`WeightingError`] naming the field.
+    /// [`WeightingError`] that names the invalid field.
     pub fn validate(&self) -> Result<(), WeightingError> {
         let fail = |field, expected, got: String| {
             Err(WeightingError {
@@ -107,18 +107,18 @@ impl Weighting {
         self.weight[before] + share * (after - self.weight[before])
     }
 
-    /// Samples left of a series of `n_samples`.
+    /// Number of output samples for a series of `n_samples`.
     pub fn output_len(&self, n_samples: usize) -> usize {
         n_samples / self.decimation
     }
 
-    /// Plan for series of `n_samples` sampled every `sample_time` seconds.
+    /// A plan for series of `n_samples`, sampled every `sample_time` seconds.
     pub fn plan(&self, n_samples: usize, sample_time: f64) -> Weighter {
         let kept = self.output_len(n_samples);
         let (long, short) = (2 * kept * self.decimation, 2 * kept);
         let scale = (self.decimation as f64).sqrt() / long.max(1) as f64;
         let resolution = 1.0 / (long.max(1) as f64 * sample_time);
-        // The bin at the new Nyquist frequency is ambiguous and is dropped when decimating.
+        // The bin at the new Nyquist frequency is ambiguous, so decimation drops it.
         let gain = (0..=kept)
             .map(|k| {
                 let dropped = k == kept && self.decimation > 1;
@@ -140,11 +140,11 @@ impl Weighting {
 }
 
 impl Weighter {
-    /// Weight two series at once (as real and imaginary part; a real even weight
-    /// keeps them apart).
+    /// Weight two series at once, as the real and imaginary parts of one series. The weight is real
+    /// and even, so the two do not mix.
     ///
-    /// Each is brought to the same size by a power of two: they may have different units, and
-    /// the rounding of the larger would drown the smaller. A series of zeros stays one.
+    /// A power of two brings each series to the same size. Otherwise, with different units, the
+    /// rounding of the larger series would drown the smaller one. A series of zeros stays zero.
     pub fn apply_pair(&self, a: &[f64], b: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let half = self.kept * self.decimation;
         let ((down_a, up_a), (down_b, up_b)) = (to_one(&a[..half]), to_one(&b[..half]));
@@ -168,8 +168,8 @@ impl Weighter {
     }
 }
 
-/// Powers of two that bring the largest magnitude of a series near one, and back; zeros for a
-/// series of zeros.
+/// The power of two that brings the largest magnitude of a series near one, and its inverse. Both
+/// are zero for a series of zeros.
 fn to_one(x: &[f64]) -> (f64, f64) {
     let largest = x.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
     if largest == 0.0 && !x.iter().any(|x| x.is_nan()) {
@@ -178,7 +178,8 @@ fn to_one(x: &[f64]) -> (f64, f64) {
     if !largest.is_normal() {
         return (1.0, 1.0);
     }
-    // Of a finite number: between -1022 and 1023, and less so that both powers are normal.
+    // The exponent of a finite number lies between -1022 and 1023. The narrower range keeps both
+    // powers normal.
     #[allow(clippy::cast_possible_truncation)]
     let exponent = largest.log2().clamp(-1000.0, 1000.0) as i32;
     (2f64.powi(-exponent), 2f64.powi(exponent))
@@ -201,7 +202,8 @@ mod tests {
         }
     }
 
-    /// Series of units as far apart as Nm a radian of play and Nm a Nm/rad^3 of a cubic spring.
+    /// The two series differ as much as torque per backlash [Nm/rad] and per cubic stiffness
+    /// [Nm/(Nm/rad^3)].
     #[test]
     fn a_series_does_not_drown_in_a_larger_one() {
         let x: Vec<f64> = (0..60)
@@ -211,12 +213,12 @@ mod tests {
         let plan = Weighting::flat().plan(60, 0.01);
         let ((a, _), (_, b)) = (plan.apply_pair(&x, &y), plan.apply_pair(&y, &x));
         for i in 0..60 {
-            // A few roundings of the largest entry.
+            // The tolerance is a few rounding errors of the largest entry.
             assert!((a[i] - x[i]).abs() < 1e-28 && (b[i] - x[i]).abs() < 1e-28);
         }
         assert!(plan.apply_pair(&y, &[0.0; 60]).1.iter().all(|v| *v == 0.0));
         assert!(plan.apply_pair(&[0.0; 60], &y).0.iter().all(|v| *v == 0.0));
-        // What is not finite is not hidden.
+        // Values that are not finite stay visible in the output.
         let (a, _) = plan.apply_pair(&[f64::NAN; 60], &y);
         let (b, _) = plan.apply_pair(&[f64::INFINITY; 60], &y);
         assert!(a.iter().chain(&b).all(|v| !v.is_finite()));
@@ -232,7 +234,7 @@ mod tests {
         let x: Vec<f64> = (0..800).map(cosine).collect();
         let (a, _) = weighting.plan(800, 1.0).apply_pair(&x, &x);
         for (j, value) in a.iter().enumerate() {
-            // Variance is kept per sample, so the amplitude grows by sqrt(decimation).
+            // The variance per sample is kept, so the amplitude grows by sqrt(decimation).
             assert!((value / 8f64.sqrt() - cosine(8 * j)).abs() < 1e-12);
         }
     }
@@ -250,7 +252,7 @@ mod tests {
         };
         let (a, _) = weighting.plan(40_000, 1e-3).apply_pair(&noise, &noise);
         let variance = a.iter().map(|v| v * v).sum::<f64>() / a.len() as f64;
-        // Standard deviation of the estimate: sqrt(2 / 8000) = 0.016; five of them.
+        // The tolerance is five standard deviations of the estimate: sqrt(2 / 8000) = 0.016.
         assert!((variance - 1.0).abs() < 0.08, "{variance}");
     }
 }

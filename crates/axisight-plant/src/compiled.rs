@@ -1,8 +1,8 @@
-//! The numbers the plant is compiled for.
+//! Scalars for which the plant is compiled.
 //!
-//! A generic function is compiled in the first crate that asks for it, and crates above use that
-//! copy as long as it is not inlined. Asked for here, the dynamics and the integrators are
-//! compiled once, and not anew whenever a crate that simulates or fits is.
+//! A generic function is compiled in the first crate that uses it with a type, and later crates use
+//! that copy unless it is inlined. This module uses the dynamics and integrators, so they are
+//! compiled once and not again with every change of a crate that simulates or fits.
 
 use crate::plant::{Plant, equilibrium};
 use crate::robot::Dynamics;
@@ -10,8 +10,10 @@ use crate::simulation::{Sample, Stepper, simulate};
 use axisight_scalar::Scalar;
 use std::hint::black_box;
 
-/// Call `$keep` for every scalar: one run; runs in lock-step; both with derivatives along one, two
-/// or four parameters for fits; eight derivatives of one run for Jacobians.
+/// Call `$keep` for every compiled scalar.
+///
+/// The scalars are: one run; runs in lock-step; runs in lock-step with derivatives along one, two
+/// or four parameters, for fits; and one run with eight derivatives, for Jacobians.
 #[macro_export]
 macro_rules! for_compiled_scalars {
     ($keep:ident) => {
@@ -25,7 +27,7 @@ macro_rules! for_compiled_scalars {
     };
 }
 
-/// Everything that crates above call, for every scalar.
+/// Reference every function that later crates call, for every scalar.
 #[inline(never)] // or it would be compiled above, where it is not called
 pub fn compiled() {
     for_compiled_scalars!(keep);

@@ -1,13 +1,17 @@
-//! The plant: an arm, the points where an effect may act on it, its equations of motion and
-//! their integration in the closed loop.
+//! The plant: an arm, the effects on it, its equations of motion and their integration in the
+//! closed loop.
 //!
-//! No effect is known here by name: a new one leaves this crate, which holds what takes the
-//! compiler longest, as it is ([`compiled`]). Modules stand bottom to top, each using only what
-//! stands before it: [`robot`] is the arm; [`effect`] says what an effect is; [`formulas`] are
-//! equations that models share; [`plant`] puts arm and effects together; [`simulation`] closes
-//! the loop.
+//! No effect is known here by name, so a new effect does not change this crate, which takes longest
+//! to compile ([`compiled`]). The modules are ordered from bottom to top, and each uses only those
+//! before it:
+//!
+//! * [`robot`] is the arm.
+//! * [`effect`] describes effects.
+//! * [`formulas`] are equations that models share.
+//! * [`plant`] combines arm and effects.
+//! * [`simulation`] closes the loop.
 
-// Kernels are generic over the scalar and must be inlined to become vector code.
+// Kernels are generic over the scalar and become vector code only if they are inlined.
 #![allow(clippy::inline_always)]
 
 pub mod compiled;

@@ -10,7 +10,7 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
-/// Structure of the model, as Python hands it over.
+/// Structure of an axis model, from Python.
 #[derive(FromPyObject)]
 pub struct ModelSpec {
     masses: usize,
@@ -21,9 +21,9 @@ pub struct ModelSpec {
     substeps: usize,
 }
 
-/// One parameter: initial, lower, upper, scale, free.
+/// One parameter: initial value, lower bound, upper bound, scale, whether it is free.
 type ParameterTuple = (f64, f64, f64, f64, bool);
-/// One data set: torque, output, sample time, weight, samples of a block.
+/// One data set: torque, output, sample time, weight, samples per block.
 type SetTuple<'py> = (
     PyReadonlyArray1<'py, f64>,
     PyReadonlyArray1<'py, f64>,
@@ -90,8 +90,8 @@ fn fit_error(error: AxisError) -> PyErr {
     }
 }
 
-/// Outcome of a search: status, parameters, loss, initial loss, iterations, evaluations,
-/// normal matrix over the free parameters, residuals, gradients of the blocks.
+/// Result of a search: status, parameters, loss, initial loss, iterations, evaluations, normal
+/// matrix over the free parameters, residuals, gradients of the blocks.
 type Outcome<'py> = (
     &'static str,
     Bound<'py, PyArray1<f64>>,
@@ -104,7 +104,7 @@ type Outcome<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
-/// Numbers by sample, and several of them.
+/// A vector over samples, and a matrix.
 type VectorAndMatrix<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
 
 fn outcome<'py>(py: Python<'py>, result: SearchResult) -> PyResult<Outcome<'py>> {
@@ -153,7 +153,8 @@ pub fn axis_fit<'py>(
     outcome(py, result.map_err(fit_error)?)
 }
 
-/// Residuals, and their derivatives `(n_free, n_residuals)`, data set after data set.
+/// Return residuals `(n_residuals,)` and their derivatives `(n_free, n_residuals)`, data set by
+/// data set.
 #[pyfunction]
 #[pyo3(signature = (model, sets, theta, free, *, whitening, predicts, cancel=None))]
 #[allow(clippy::too_many_arguments)]
@@ -182,7 +183,8 @@ pub fn axis_linearize<'py>(
     ))
 }
 
-/// Run one data set: output `(n,)` and states `(n, 2 masses)`: motor angle, deflections, speeds.
+/// Run one data set. Return output `(n,)` and states `(n, 2 masses)`: motor angle, deflections,
+/// speeds.
 #[pyfunction]
 #[pyo3(signature = (model, set, theta, *, predicts, cancel=None))]
 pub fn axis_simulate<'py>(

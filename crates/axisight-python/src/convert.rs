@@ -1,4 +1,4 @@
-//! Between `NumPy` arrays and plain vectors.
+//! Conversion between `NumPy` arrays and plain vectors.
 
 use crate::entry::InputError;
 use numpy::{
@@ -6,7 +6,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-/// Row-major copy of a two-dimensional array with `columns` columns.
+/// Row-major copy of a two-dimensional array; an error unless it has `columns` columns.
 pub fn rows(array: &PyReadonlyArray2<'_, f64>, field: &str, columns: usize) -> PyResult<Vec<f64>> {
     let view = array.as_array();
     if view.ncols() != columns {
@@ -19,7 +19,8 @@ pub fn rows(array: &PyReadonlyArray2<'_, f64>, field: &str, columns: usize) -> P
     Ok(view.iter().copied().collect())
 }
 
-/// Row-major copies of the planes of a three-dimensional array, `columns` wide.
+/// Row-major copies of the planes of a three-dimensional array; an error unless it has `columns`
+/// columns.
 pub fn planes(
     array: &PyReadonlyArray3<'_, f64>,
     field: &str,
@@ -64,7 +65,7 @@ pub fn array1<'py>(py: Python<'py>, data: Vec<f64>) -> Bound<'py, PyArray1<f64>>
     data.into_pyarray(py)
 }
 
-/// A two-dimensional array entry by entry.
+/// A two-dimensional array from its entries.
 pub fn matrix<'py>(
     py: Python<'py>,
     (rows, columns): (usize, usize),

@@ -8,7 +8,7 @@ use axisight_core::robot::{EffectSetting, Place};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Where an effect acts as Python says it: 1-based axis, two of them, or neither for the arm.
+/// Place of an effect, from Python: one or two axes counted from 1, or neither for the arm.
 #[derive(FromPyObject, IntoPyObject)]
 pub enum AxisNumber {
     /// One axis.
@@ -17,10 +17,10 @@ pub enum AxisNumber {
     Two(usize, usize),
 }
 
-/// An effect as Python hands it over: name, axis or axes or None, parameters in table order.
+/// An effect, from Python: name, axis or axes or None, parameters in table order.
 pub type EffectTuple = (String, Option<AxisNumber>, Vec<f64>);
 
-/// Core settings; axes become 0-based (axis 0 stays out of range and is refused by the core).
+/// Core settings with axes counted from 0. The core refuses axis 0, which stays out of range.
 pub fn settings(effects: Vec<EffectTuple>) -> Vec<EffectSetting<f64>> {
     let place = |axis| match axis {
         None => Place::Arm,
@@ -37,7 +37,7 @@ pub fn settings(effects: Vec<EffectTuple>) -> Vec<EffectSetting<f64>> {
     effects.into_iter().map(setting).collect()
 }
 
-/// A core setting as Python has it.
+/// A core setting, for Python.
 pub fn tuple(setting: &EffectSetting<f64>) -> EffectTuple {
     let axis = match setting.place {
         Place::Arm => None,
@@ -106,7 +106,7 @@ fn parameter<'py>(py: Python<'py>, p: &ParameterInfo) -> PyResult<Bound<'py, PyD
     Ok(row)
 }
 
-/// How an effect and others are akin.
+/// Add the relations of an effect to other effects.
 fn relations(out: &Bound<'_, PyDict>, info: &EffectInfo) -> PyResult<()> {
     let py = out.py();
     let resembles = info.resembles.map(|r| resembles(py, &r)).transpose()?;
@@ -179,7 +179,7 @@ fn spring<'py>(py: Python<'py>, s: &SpringChange) -> PyResult<Bound<'py, PyDict>
     Ok(row)
 }
 
-/// A variant without fields as Python names it: `TorquePath` is `torque_path`.
+/// A variant without fields as a Python word: `TorquePath` becomes `torque_path`.
 fn word(variant: &impl std::fmt::Debug) -> String {
     let mut out = String::new();
     for c in format!("{variant:?}").chars() {

@@ -1,4 +1,4 @@
-//! The one way into the core: own inputs, release the GIL, catch panics, honour Ctrl-C.
+//! The entry into the core: own the inputs, release the GIL, catch panics, react to Ctrl-C.
 
 use crate::own_pool::with_threads;
 use pyo3::prelude::*;
@@ -38,10 +38,10 @@ pub fn flag(token: Option<&Bound<'_, CancelToken>>) -> Arc<AtomicBool> {
     token.map_or_else(Arc::default, |t| Arc::clone(&t.get().flag))
 }
 
-/// How often a waiting call looks for Ctrl-C.
+/// Interval at which a waiting call checks for Ctrl-C.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Run `work` without the GIL; Ctrl-C sets `cancel` and is raised once `work` has returned.
+/// Run `work` without the GIL. Ctrl-C sets `cancel`, and is raised once `work` has returned.
 pub fn detached<T: Send>(
     py: Python<'_>,
     cancel: &AtomicBool,
@@ -52,13 +52,13 @@ pub fn detached<T: Send>(
             let (done, finished) = mpsc::channel();
             let handle = scope.spawn(move || {
                 let result = with_threads(work);
-                // The receiver outlives the scope; a failed send only means nobody waits.
+                // The receiver outlives the scope. A failed send only means that nobody waits.
                 let _ = done.send(());
                 result
             });
             let mut interrupt = None;
             while finished.recv_timeout(POLL) == Err(mpsc::RecvTimeoutError::Timeout) {
-                // The method itself is not general enough over the lifetime.
+                // The method path is not general enough over the lifetime.
                 #[allow(clippy::redundant_closure_for_method_calls)]
                 let signals = Python::attach(|py| py.check_signals());
                 if let Err(e) = signals {
@@ -77,8 +77,8 @@ pub fn detached<T: Send>(
     })
 }
 
-/// Run `work` on `NumPy` memory in place, that is with the GIL; then let Ctrl-C and other
-/// threads have their turn. For pieces of a few milliseconds.
+/// Run `work` on `NumPy` memory in place, with the GIL. Afterwards Ctrl-C and other threads get a
+/// turn. Use it for work of a few milliseconds.
 pub fn in_place<T>(py: Python<'_>, work: impl FnOnce() -> T) -> PyResult<T> {
     let result = catch_unwind(AssertUnwindSafe(work));
     py.check_signals()?;

@@ -12,12 +12,12 @@ use pyo3::types::PyDict;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// Iterations, first level, last level, relaxation, oversampling.
+/// Clipping: iterations, first level, last level, relaxation, oversampling.
 type ClippingTuple = (usize, f64, f64, f64, usize);
-/// First exponent, last exponent, iterations, oversampling.
+/// Refinement: first exponent, last exponent, iterations, oversampling.
 type RefinementTuple = (u32, u32, usize, usize);
 
-/// Uniform random phases of one realization.
+/// Uniform random phases of one realization [rad].
 #[pyfunction]
 pub fn random_phases<'py>(
     py: Python<'py>,
@@ -53,7 +53,7 @@ pub fn square_period<'py>(
     Ok(array1(py, square.period()))
 }
 
-/// A matrix of directions by name.
+/// A direction matrix by name.
 #[pyfunction]
 pub fn directions<'py>(
     py: Python<'py>,
@@ -63,7 +63,7 @@ pub fn directions<'py>(
     array2(py, core::directions(name, n).map_err(input_error)?, n)
 }
 
-/// Search phases of a low crest factor.
+/// Search for phases with a low crest factor.
 #[pyfunction]
 #[pyo3(signature = (lines, amplitude, *, snow, snow_limit, phase, seed, clipping, refinement, starts, time_s, threads, cancel=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding

@@ -1,4 +1,4 @@
-//! Fits to logs, which are made ready once and stay here.
+//! Fits to logs that are prepared once and kept in the core.
 
 use crate::convert::rows;
 use crate::effects::{EffectTuple, settings};
@@ -20,12 +20,12 @@ use pyo3::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Number of a parameter and its Jacobian column.
+/// Index of a parameter with its Jacobian column.
 type WarmColumn<'py> = (usize, Bound<'py, Column>);
 /// A flag that ends a call early.
 type Cancel<'a, 'py> = Option<&'a Bound<'py, CancelToken>>;
 
-/// What to mind of every status that is no convergence: pairs of status and advice.
+/// Pairs of status and advice, for every status without convergence.
 #[pyfunction]
 pub fn status_advice() -> Vec<(&'static str, &'static str)> {
     let all = Status::ALL.iter();
@@ -61,8 +61,8 @@ fn linearize<P: Problem + Send>(
     Ended::of(at.map(|at| Linearization { at }))
 }
 
-/// Input, target and certainty of a record, arrays `(n, n_axes)`, driven joint angles where it begins,
-/// and how many samples of input and target lead to what is compared.
+/// One record: input, target and certainty `(n, n_axes)`, driven joint angles at the start, and the
+/// number of run-up samples of input and target.
 type RecordTuple<'py> = (
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
@@ -71,17 +71,17 @@ type RecordTuple<'py> = (
     usize,
 );
 
-/// Runs of a model over all logs, for models close to it.
+/// Runs of a model over all logs, for the simulation of similar models.
 #[pyclass(frozen, module = "axisight._core")]
 pub struct Courses {
-    /// Nothing where the arm cannot be linearised along runs.
+    /// `None` if the arm cannot be linearised along runs.
     runs: Option<Arc<Runs>>,
 }
 
-/// Logs that a robot is simulated along, ready for fits of any effects.
+/// Logs for the simulation of a robot, ready for fits of any effects.
 #[pyclass(frozen, module = "axisight._core")]
 pub struct SimulatedLogs {
-    /// Without effects and parameters.
+    /// The problem without effects and parameters.
     bare: SimulationErrorProblem,
 }
 
@@ -169,19 +169,19 @@ impl SimulatedLogs {
         Ok(Self { bare })
     }
 
-    /// The same of some logs, by their numbers.
+    /// The same logs, reduced to those with the given indices.
     fn part(&self, logs: Vec<usize>) -> PyResult<Self> {
         let bare = self.bare.part(&logs).map_err(problem_error)?;
         Ok(Self { bare })
     }
 
-    /// The same of the first `samples` of each log that are compared.
+    /// The same logs, reduced to the first `samples` compared samples of each.
     fn first(&self, samples: Vec<usize>) -> PyResult<Self> {
         let bare = self.bare.first(&samples).map_err(problem_error)?;
         Ok(Self { bare })
     }
 
-    /// Fit the simulation.
+    /// Fit the simulation to the logs.
     #[pyo3(signature = (effects, parameters, options, *, warm=Vec::new(), courses=None, cancel=None))]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
     fn fit(
@@ -200,7 +200,7 @@ impl SimulatedLogs {
         solve(py, &cancel, (&problem, parameters), &options, &warm)
     }
 
-    /// The simulation at the initial values of the parameters.
+    /// Evaluate the simulation at the initial values of the parameters.
     #[pyo3(signature = (effects, parameters, options, *, warm=Vec::new(), courses=None, cancel=None))]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
     fn evaluate(
@@ -219,7 +219,7 @@ impl SimulatedLogs {
         linearize(py, &cancel, (&problem, parameters), &options, &warm)
     }
 
-    /// Runs of a model, along which the arm of models close to it may be linearised.
+    /// Run a model, for linearising the arm of similar models along the runs.
     #[pyo3(signature = (effects, parameters, *, cancel=None))]
     fn run(
         &self,
@@ -238,7 +238,7 @@ impl SimulatedLogs {
     }
 }
 
-/// A motion as (position, velocity, acceleration, torque, certainty), each `(n, n_axes)`, motor side.
+/// One motion: position, velocity, acceleration, torque, certainty, each `(n, n_axes)`, motor side.
 type MotionTuple<'py> = (
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
@@ -247,10 +247,10 @@ type MotionTuple<'py> = (
     PyReadonlyArray2<'py, f64>,
 );
 
-/// Measured motions that a robot's torque is predicted from, ready for fits of any effects.
+/// Measured motions for predicting a robot's torque, ready for fits of any effects.
 #[pyclass(frozen, module = "axisight._core")]
 pub struct MeasuredMotions {
-    /// Without effects and parameters.
+    /// The problem without effects and parameters.
     bare: InverseDynamics,
 }
 
@@ -301,7 +301,7 @@ impl MeasuredMotions {
         Ok(Self { bare })
     }
 
-    /// The same of some motions, by their numbers.
+    /// The same motions, reduced to those with the given indices.
     fn part(&self, logs: Vec<usize>) -> PyResult<Self> {
         let bare = self.bare.part(&logs).map_err(problem_error)?;
         Ok(Self { bare })
@@ -317,7 +317,7 @@ impl MeasuredMotions {
         })
     }
 
-    /// Fit the predicted torque.
+    /// Fit the predicted torque to the measured torque.
     #[pyo3(signature = (effects, parameters, options, *, warm=Vec::new(), cancel=None))]
     fn fit(
         &self,
@@ -333,7 +333,7 @@ impl MeasuredMotions {
         solve(py, &flag(cancel), (&problem, parameters), &options, &warm)
     }
 
-    /// The predicted torque at the initial values of the parameters.
+    /// Evaluate the predicted torque at the initial values of the parameters.
     #[pyo3(signature = (effects, parameters, options, *, warm=Vec::new(), cancel=None))]
     fn evaluate(
         &self,

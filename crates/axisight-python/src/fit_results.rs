@@ -1,4 +1,4 @@
-//! What fits hand back.
+//! Results of fits, for Python.
 
 use crate::convert::{array1, array2, array3};
 use crate::entry::input_error;
@@ -9,7 +9,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use std::sync::Arc;
 
-/// A model that does not hold: it cannot be run along some of the logs, or not at all.
+/// A model without a valid run, along some of the logs or along any log.
 #[pyclass(frozen, module = "axisight._core")]
 pub struct Diverged {
     divergence: Divergence,
@@ -44,7 +44,7 @@ impl Diverged {
     }
 }
 
-/// What a model gives that holds, or that it does not.
+/// The result of a model, or its divergence if it has no valid run.
 #[derive(IntoPyObject)]
 pub enum Ended<T> {
     Holds(T),
@@ -52,7 +52,7 @@ pub enum Ended<T> {
 }
 
 impl<T> Ended<T> {
-    /// Misuse and Ctrl-C raise.
+    /// Convert an outcome. Invalid input and Ctrl-C raise.
     pub fn of(outcome: Result<T, ProblemError>) -> PyResult<Self> {
         match outcome {
             Ok(found) => Ok(Self::Holds(found)),
@@ -62,7 +62,7 @@ impl<T> Ended<T> {
     }
 }
 
-/// An error that is no divergence.
+/// The Python error of a problem error that is not a divergence.
 pub fn problem_error(e: ProblemError) -> PyErr {
     match e {
         ProblemError::Cancelled => pyo3::exceptions::PyKeyboardInterrupt::new_err("cancelled"),
@@ -70,10 +70,10 @@ pub fn problem_error(e: ProblemError) -> PyErr {
     }
 }
 
-/// Log, axis, start and length of a block.
+/// A block: log, axis, start and length.
 type BlockTuple = (usize, usize, usize, usize);
 
-/// A column of a Jacobian, kept where it was computed for other fits to use.
+/// A column of a Jacobian, kept in the core for reuse by other fits.
 #[pyclass(frozen, module = "axisight._core")]
 pub struct Column {
     pub(crate) shared: Shared,
@@ -81,13 +81,13 @@ pub struct Column {
 
 #[pymethods]
 impl Column {
-    /// A copy.
+    /// The values, as a copy.
     #[getter]
     fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array1(py, self.shared.to_vec())
     }
 
-    /// Ranges of rows, as a column.
+    /// Ranges of rows (start, end), as a column.
     fn part(&self, rows: Vec<(usize, usize)>) -> PyResult<Self> {
         let mut kept = Vec::with_capacity(rows.iter().map(|(a, b)| b.saturating_sub(*a)).sum());
         for (first, last) in rows {
@@ -105,18 +105,18 @@ impl Column {
     }
 }
 
-/// Rows of a matrix from columns that are kept apart.
+/// Rows of a matrix, from separate columns.
 fn stacked(columns: &[Shared]) -> Vec<f64> {
     columns.iter().flat_map(|c| c.iter().copied()).collect()
 }
 
-/// Columns that others may use too.
+/// Columns for Python, shared with the core.
 fn handed_out(columns: &[Shared]) -> Vec<Column> {
     let shared = columns.iter().map(Arc::clone);
     shared.map(|shared| Column { shared }).collect()
 }
 
-/// Result of a fit; arrays are copies.
+/// Result of a fit. Arrays are copies.
 #[pyclass(frozen, module = "axisight._core")]
 pub struct FitResult {
     pub(crate) fit: Fit,
@@ -185,7 +185,7 @@ impl FitResult {
     fn jacobian<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         array2(py, stacked(&self.fit.columns), self.fit.n_residuals)
     }
-    /// The same, kept where they are.
+    /// Jacobian columns of the free parameters, kept in the core.
     #[getter]
     fn columns(&self) -> Vec<Column> {
         handed_out(&self.fit.columns)
@@ -208,7 +208,7 @@ impl FitResult {
     }
 }
 
-/// A problem at given parameters; arrays are copies.
+/// A problem linearized at given parameters. Arrays are copies.
 #[pyclass(frozen, module = "axisight._core")]
 pub struct Linearization {
     pub(crate) at: Point,
@@ -241,7 +241,7 @@ impl Linearization {
     fn jacobian<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         array2(py, stacked(&self.at.columns), self.at.residual.len())
     }
-    /// The same, kept where they are.
+    /// Jacobian columns of the free parameters, kept in the core.
     #[getter]
     fn columns(&self) -> Vec<Column> {
         handed_out(&self.at.columns)

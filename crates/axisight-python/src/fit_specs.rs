@@ -1,4 +1,4 @@
-//! What fits are asked for, as Python hands it over.
+//! Specifications of fits, from Python.
 
 use crate::entry::{InputError, input_error};
 use axisight_core::robot::{Parameter, RobotDescription};
@@ -6,12 +6,12 @@ use axisight_identification::logs::{FitOptions, FitParameter, Loss, Target};
 use axisight_numerics::Weighting;
 use pyo3::prelude::*;
 
-/// One parameter to fit, as Python hands it over.
+/// One parameter to fit, from Python.
 #[derive(FromPyObject)]
 pub struct ParameterSpec {
-    /// Robot parameter name, or None for an effect parameter.
+    /// Name of a robot parameter, or None for an effect parameter.
     robot: Option<String>,
-    /// Position of the effect in the list, then of the parameter in its table.
+    /// Index of the effect in the list, then of the parameter in its table.
     effect: Option<(usize, usize)>,
     initial: f64,
     lower: f64,
@@ -20,11 +20,11 @@ pub struct ParameterSpec {
     prior: Option<(f64, f64)>,
     frozen: bool,
     nuisance: bool,
-    /// Of a shape: the only size of its effect, in the table of the effect.
+    /// For a shape: index of the only size parameter in the table of its effect.
     amplitude: Option<usize>,
 }
 
-/// Settings of a fit, as Python hands them over.
+/// Settings of a fit, from Python.
 #[derive(FromPyObject)]
 pub struct OptionSpec {
     max_iterations: usize,
@@ -38,7 +38,7 @@ pub struct OptionSpec {
 /// Frequencies [Hz], weights and decimation of one axis.
 pub type WeightingTuple = (Vec<f64>, Vec<f64>, usize);
 
-/// Parameters of a fit; raises `InputError` for one that `robot` does not have.
+/// Parameters of a fit. Raises `InputError` if `robot` does not have one of them.
 pub fn parameters(
     specs: &[ParameterSpec],
     robot: &RobotDescription,
@@ -76,7 +76,7 @@ pub fn parameters(
         .collect()
 }
 
-/// Loss by name.
+/// Loss by name. Raises `InputError` for an unknown name.
 pub fn loss(spec: &OptionSpec) -> PyResult<Loss> {
     match spec.loss.as_str() {
         "squared" => Ok(Loss::Squared),
@@ -100,7 +100,7 @@ pub fn options(spec: &OptionSpec) -> PyResult<FitOptions> {
     })
 }
 
-/// Weights of errors, one entry an axis.
+/// Weightings of errors, one per axis.
 pub fn weightings(specs: Vec<WeightingTuple>) -> Vec<Weighting> {
     specs
         .into_iter()

@@ -1,4 +1,4 @@
-//! Fits of linearized robots to frequency responses, and the choice of operating points.
+//! Fits of linearized robots to frequency responses, and choice of operating points.
 
 use crate::convert::{array1, array2, array3, matrix};
 use crate::effects::{EffectTuple, settings};
@@ -18,7 +18,7 @@ use pyo3::types::PyDict;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// One parameter, as Python hands it over.
+/// One parameter, from Python.
 #[derive(FromPyObject)]
 pub struct FrequencyParameterSpec {
     name: String,
@@ -30,7 +30,7 @@ pub struct FrequencyParameterSpec {
     frozen: bool,
 }
 
-/// Settings of a fit, as Python hands them over.
+/// Settings of a fit, from Python.
 #[derive(FromPyObject)]
 pub struct FrequencyOptionSpec {
     sampled: bool,
@@ -44,8 +44,8 @@ pub struct FrequencyOptionSpec {
     step_tolerance: f64,
 }
 
-/// Joint angles, frequencies, response, variance, variance to weigh by, covariance, reference of
-/// logarithmic weights, derivative order; arrays of all lines and elements flat.
+/// One pose: joint angles, frequencies, response, variance, variance for the weights, covariance,
+/// reference of logarithmic weights, derivative order. Arrays over lines and elements are flat.
 type PoseTuple<'py> = (
     Vec<f64>,
     PyReadonlyArray1<'py, f64>,
@@ -148,7 +148,7 @@ fn failure(e: FrequencyFitError) -> PyErr {
     }
 }
 
-/// Result of a fit; arrays are copies, matrices run over the free parameters as searched.
+/// Result of a fit. Arrays are copies, and matrices cover the free parameters in search units.
 #[pyclass(frozen, module = "axisight._core")]
 pub struct FrequencyFitResult {
     fit: FrequencyFit,
@@ -164,7 +164,7 @@ impl FrequencyFitResult {
     fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array1(py, self.fit.values.clone())
     }
-    /// Slope of the value over the searched number.
+    /// Slopes of the values over their search units.
     #[getter]
     fn slopes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array1(py, self.fit.slopes.clone())
@@ -197,12 +197,12 @@ impl FrequencyFitResult {
     fn at_bound(&self) -> Vec<usize> {
         self.fit.at_bound.clone()
     }
-    /// `J^T W J` and priors.
+    /// `J^T W J` with the priors.
     #[getter]
     fn information<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         matrix(py, self.fit.matrix.shape(), |i, j| self.fit.matrix[(i, j)])
     }
-    /// Covariance of the gradient by the response's uncertainty, if known.
+    /// Covariance of the gradient due to the uncertainty of the responses, if known.
     #[getter]
     fn expected_scatter<'py>(
         &self,
@@ -213,7 +213,7 @@ impl FrequencyFitResult {
             .map(|m| matrix(py, m.shape(), |i, j| m[(i, j)]))
             .transpose()
     }
-    /// Covariance of the gradient by its scatter over blocks of lines.
+    /// Covariance of the gradient from its scatter over blocks of lines.
     #[getter]
     fn block_scatter<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let m = &self.fit.scatter.blocks;
@@ -227,7 +227,7 @@ impl FrequencyFitResult {
     }
 }
 
-/// Fit the linearized robot to responses.
+/// Fit the linearized robot to frequency responses.
 #[pyfunction]
 #[pyo3(signature = (robot, effects, parameters, poses, options, *, cancel=None))]
 pub fn fit_frequency_responses(
@@ -252,7 +252,7 @@ pub fn fit_frequency_responses(
     })
 }
 
-/// Information each pose gives on the free parameters, `(n_poses, n_free, n_free)`.
+/// Information of each pose on the free parameters, `(n_poses, n_free, n_free)`.
 #[pyfunction]
 #[pyo3(signature = (robot, effects, parameters, poses, options, *, cancel=None))]
 pub fn frequency_information<'py>(
@@ -282,7 +282,7 @@ pub fn frequency_information<'py>(
     array3(py, flat, n, n)
 }
 
-/// Response of the linearized robot, `(n_freq, n_axes, 2 n_axes)`, real and imaginary parts
+/// Response of the linearized robot, `(n_freq, n_axes, 2 n_axes)`, with real and imaginary parts
 /// interleaved along the last axis.
 #[pyfunction]
 pub fn frequency_response<'py>(
@@ -317,7 +317,7 @@ pub fn frequency_response<'py>(
     array3(py, data, n, 2 * n)
 }
 
-/// Choose operating points by their information matrices, `(n, p, p)`, besides prior
+/// Choose operating points by their information matrices `(n, p, p)`, in addition to prior
 /// information `(p, p)`.
 #[pyfunction]
 #[pyo3(signature = (information, prior, count, *, repeats, gap_tolerance, max_iterations))]

@@ -1,9 +1,11 @@
-//! Frequency responses from records, and small complex matrices by the million.
+//! Frequency responses from records, and batches of millions of small complex matrices.
 //!
-//! These calls read and write `NumPy` memory in place: copying a million 3x3 matrices takes as
-//! long as inverting them (17 to 56 ns each), copying the records as long as their spectra. Nobody
-//! may write what is read, so the GIL is kept, but for pieces of a few milliseconds only; see
-//! [`in_place`].
+//! These calls read and write `NumPy` memory in place. A copy of a million 3x3 matrices would take
+//! as long as their inversion (17 to 56 ns each), and a copy of the records as long as their
+//! spectra.
+//!
+//! Nobody may write the memory while it is read, so the GIL is kept, but only for pieces of a few
+//! milliseconds; see [`in_place`].
 
 use crate::entry::{AxisightError, InputError, detached, in_place, input_error};
 use axisight_numerics::{Threads, invert_batch, right_divide_batch};
@@ -17,10 +19,10 @@ use pyo3::types::PyDict;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-/// Numbers of one piece of work with the GIL.
+/// Numbers in one piece of work with the GIL.
 const PIECE: usize = 1 << 18;
 
-/// The threads of a call: 0 for every core, none of its own for 1.
+/// The threads of a call: 0 for every core, 1 for the calling thread.
 struct Pool(Option<rayon::ThreadPool>);
 
 impl Pool {
@@ -43,9 +45,9 @@ impl Pool {
     }
 }
 
-/// Pieces of `count` things of `size` numbers, each a range of things.
+/// Ranges that divide `count` items of `size` numbers into pieces.
 fn pieces(count: usize, size: usize) -> impl Iterator<Item = Range<usize>> {
-    // Whole groups of lanes, or the kernels fill up.
+    // Whole groups of lanes, because kernels pad incomplete groups.
     let step = (PIECE / size.max(1)).next_multiple_of(64).max(64);
     (0..count)
         .step_by(step)
@@ -65,7 +67,7 @@ fn shape3(shape: &[usize]) -> (usize, usize, usize) {
     (shape[0], shape[1], shape[2])
 }
 
-/// `out = matrices^-1`, true where singular.
+/// Write `matrices^-1` to `out`. Return true for singular matrices.
 #[pyfunction]
 #[pyo3(signature = (matrices, out, *, threads=1))]
 pub fn invert_matrices<'py>(
@@ -100,7 +102,7 @@ pub fn invert_matrices<'py>(
     Ok(singular.into_pyarray(py))
 }
 
-/// `out = y u^-1`, true where `u` is singular.
+/// Write `y u^-1` to `out`. Return true where `u` is singular.
 #[pyfunction]
 #[pyo3(signature = (y, u, out, *, threads=1))]
 pub fn right_divide_matrices<'py>(
@@ -142,7 +144,7 @@ pub fn right_divide_matrices<'py>(
 }
 
 type Records<'py> = PyReadonlyArray4<'py, f64>;
-/// Name, samples, and whether the drift is removed.
+/// One signal: name, samples, and whether the drift is removed.
 type Given<'a, 'py> = (&'a str, &'a Records<'py>, bool);
 
 /// The common extent of all signals.
@@ -166,7 +168,7 @@ fn extent_of(given: &[Given<'_, '_>]) -> PyResult<Extent> {
     })
 }
 
-/// Spectra of all signals, a few experiments at a time.
+/// Spectra of all signals, computed for a few experiments at a time.
 fn spectra(
     py: Python<'_>,
     given: &[Given<'_, '_>],
@@ -178,7 +180,7 @@ fn spectra(
     let plan = LineSpectra::new(&channels, extent.samples, lines);
     let record = extent.periods * extent.samples;
     let size = record * channels.iter().sum::<usize>();
-    // An even number: periods are transformed in pairs.
+    // An even number, because periods are transformed in pairs.
     let step = (PIECE / size.max(1)).max(1).next_multiple_of(2);
     let mut out = Vec::new();
     for first in (0..extent.experiments).step_by(step) {
@@ -210,7 +212,7 @@ fn shaped<'py, T: Element>(
     data.into_pyarray(py).reshape(shape.to_vec())
 }
 
-/// DFT lines of one signal, (experiment, period, line, channel).
+/// DFT lines of one signal, `(experiment, period, line, channel)`.
 #[pyfunction]
 #[pyo3(signature = (signal, lines, *, remove_drift, threads=1))]
 pub fn record_spectra<'py>(
@@ -232,7 +234,7 @@ pub fn record_spectra<'py>(
     shaped(py, out, &shape)
 }
 
-/// The multivariable estimate with its uncertainty.
+/// Multivariable estimate with its uncertainty.
 #[pyfunction]
 #[pyo3(signature = (input, output, reference, lines, factor, *, remove_drift, threads=1))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding

@@ -1,6 +1,6 @@
-//! Python bindings of the Axisight core; no numerics live here.
+//! Python bindings of the Axisight core, without numerics of their own.
 
-// PyO3 hands over owned values and names the lifetime of the interpreter.
+// PyO3 passes owned values and names the lifetime of the interpreter.
 #![allow(clippy::needless_pass_by_value, clippy::elidable_lifetime_names)]
 
 mod axis_fit;
@@ -23,7 +23,7 @@ mod simulation;
 
 use pyo3::prelude::*;
 
-/// The processor lacks what the kernels were compiled for.
+/// Reason why this processor cannot run the kernels, or `None`.
 fn unsupported() -> Option<&'static str> {
     #[cfg(target_arch = "x86_64")]
     if !(is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")) {

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::atomic::AtomicBool;
 
-/// Records as the core takes them: owned, checked for equal shape.
+/// Records for the core: owned, and checked for equal shapes.
 struct Owned {
     shape: [usize; 2],
     channels: [usize; 2],
@@ -89,8 +89,8 @@ fn shaped<'py, T: Element>(
     data.into_pyarray(py).reshape(shape.to_vec())
 }
 
-/// Codes of `axisight.frf.Flag`.
-/// Local rational method (polynomial for denominator order 0) at lines of the whole record.
+/// Local rational method (polynomial for denominator order 0) at lines of the whole record. Flags
+/// are codes of `axisight.frf.Flag`.
 #[pyfunction]
 #[pyo3(signature = (input, output, lines, *, order, denominator_order, half_width, band, threads=0))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
@@ -116,7 +116,8 @@ pub fn frf_local_model<'py>(
     })
 }
 
-/// Local polynomial method for whole periods, at lines of the period.
+/// Local polynomial method for whole periods, at lines of the period. Flags are codes of
+/// `axisight.frf.Flag`.
 #[pyfunction]
 #[pyo3(signature = (input, output, lines, *, n_periods, order, half_width, threads=0))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding

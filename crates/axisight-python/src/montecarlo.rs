@@ -18,12 +18,12 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Parameter, distribution, relative and absolute scale.
+/// Spread: parameter, distribution, relative scale, absolute scale.
 type SpreadTuple = (String, String, f64, f64);
-/// Amplitude, period in seconds, smoothing samples.
+/// Square wave: amplitude, period [s], smoothing samples.
 type SquareTuple = (f64, f64, usize);
 
-/// A checked study; immutable, so threads may share it.
+/// A checked study. It is immutable, so threads may share it.
 #[pyclass(frozen, module = "axisight._core")]
 pub struct MonteCarloStudy {
     study: Study,
@@ -175,7 +175,7 @@ impl MonteCarloStudy {
         shaped(py, data, &[samples, n])
     }
 
-    /// Accumulators of runs `first` to `first + count - 1`; None when cancelled.
+    /// Accumulated results of the runs `first` to `first + count - 1`, or None if cancelled.
     #[pyo3(signature = (seed, first, count, *, keep_responses=false, cancel=None))]
     fn block<'py>(
         &self,
@@ -239,7 +239,7 @@ impl MonteCarloStudy {
     }
 }
 
-/// Names of the failure codes in a block.
+/// Names of the failure codes of a block.
 #[pyfunction]
 pub fn failure_kinds() -> Vec<&'static str> {
     FailureKind::ALL.iter().map(|k| k.name()).collect()
@@ -293,7 +293,7 @@ impl MonteCarloEnsemble {
         self.ensemble.merge(&moments, &sketch).map_err(input_error)
     }
 
-    /// Statistics so far, arrays `(line, output, input)`; quantiles lead.
+    /// Statistics so far, as arrays `(line, output, input)`. Quantiles have a leading axis.
     fn summary<'py>(&self, py: Python<'py>, quantiles: Vec<f64>) -> PyResult<Bound<'py, PyDict>> {
         if let Some(q) = quantiles.iter().find(|q| !(0.0..=1.0).contains(*q)) {
             return Err(input_error(format!("quantiles: expected 0 to 1, got {q}")));

@@ -1,17 +1,19 @@
-//! Threads for a process that was forked after the core had threads: those of the parent are gone in
-//! the child, and whoever waits for them waits for ever.
+//! Threads for a process that was forked after the core had started threads.
+//!
+//! The parent's threads do not exist in the child, so waiting for them would never end.
 
 use rayon::ThreadPool;
 use std::process;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// The process in which the core first had work, and the threads of rayon began.
+/// Process in which the core was first used and rayon started its threads.
 static FIRST: OnceLock<u32> = OnceLock::new();
 
-/// The threads of a forked process, with its number: a process forked from that one needs others.
+/// Threads of a forked process, with its process id. A process forked from that one needs its own.
 static FORKED: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
-/// Run `work` where its parallel parts find threads; an error where a forked process can have none.
+/// Run `work` with threads for its parallel parts; an error if a forked process cannot start
+/// threads.
 pub fn with_threads<T: Send>(
     work: impl FnOnce() -> T + Send,
 ) -> Result<T, rayon::ThreadPoolBuildError> {
@@ -30,7 +32,7 @@ fn forked(here: u32) -> Result<Arc<ThreadPool>, rayon::ThreadPoolBuildError> {
         return Ok(Arc::clone(pool));
     }
     let pool = Arc::new(rayon::ThreadPoolBuilder::new().build()?);
-    // To drop the pool of the parent would wait for threads that are not there.
+    // Dropping the parent's pool would wait for threads that do not exist.
     if let Some((_, parents)) = held.replace((here, Arc::clone(&pool))) {
         std::mem::forget(parents);
     }

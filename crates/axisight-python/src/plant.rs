@@ -1,4 +1,4 @@
-//! The equations of a robot at single states, for simulators that are not ours.
+//! The equations of a robot at single states, for external simulators.
 
 use crate::convert::{array1, array2, rows};
 use crate::effects::{EffectTuple, settings};
@@ -8,7 +8,8 @@ use axisight_core::plant::{assemble, equilibrium};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-/// Rates of states `(m, n_states)` under delivered motor torques, one an axis, the same for all.
+/// Rates of states `(m, n_states)` under delivered motor torques `(n_axes,)`, the same for all
+/// states.
 #[pyfunction]
 pub fn state_rates<'py>(
     py: Python<'py>,
@@ -39,7 +40,7 @@ pub fn state_rates<'py>(
     array2(py, rates, width)
 }
 
-/// State of a robot at rest at joint angles, what effects remember with it.
+/// State of a robot at rest at joint angles, including the states of effects.
 #[pyfunction]
 pub fn state_at_rest<'py>(
     py: Python<'py>,

@@ -10,7 +10,7 @@ use numpy::{
 use pyo3::prelude::*;
 use std::sync::atomic::AtomicBool;
 
-/// Signal, joint coefficients, row coefficients, dead band, smoothing.
+/// Extra column: signal, joint coefficients, row coefficients, dead band, smoothing.
 pub type ExtraTuple = (String, Vec<f64>, Vec<f64>, f64, f64);
 
 fn extras(tuples: Vec<ExtraTuple>) -> PyResult<Vec<Extra>> {
@@ -64,7 +64,7 @@ impl Owned {
     }
 }
 
-/// On as many threads as asked for; zero is all, without the cost of a new pool.
+/// Run on the given number of threads; zero means all, without the cost of a new pool.
 fn on_threads<T: Send>(
     py: Python<'_>,
     threads: usize,
@@ -81,7 +81,7 @@ fn on_threads<T: Send>(
     detached(py, &cancel, || pool.install(work))
 }
 
-/// Regressor of the torques `rows` picks or mixes.
+/// Regressor of the torques that `rows` selects or combines.
 #[pyfunction]
 #[pyo3(signature = (robot, q, v, a, *, rows, extras, threads=0))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
@@ -110,7 +110,7 @@ pub fn torque_regressor<'py>(
     array3(py, out, shape[1], shape[2])
 }
 
-/// Regressor of the links' energy.
+/// Regressor of the energy of the links.
 #[pyfunction]
 #[pyo3(signature = (robot, q, v, *, threads=0))]
 pub fn energy_regressor<'py>(
@@ -130,7 +130,7 @@ pub fn energy_regressor<'py>(
     array2(py, out.map_err(input_error)?, regressor.n_parameters())
 }
 
-/// Triangular factors of `[Phi | tau]`, per block of samples and row.
+/// Triangular factors of `[Phi | tau]`, for each block of samples and each row.
 #[pyfunction]
 #[pyo3(signature = (robot, q, v, a, torque, *, rows, extras, columns, known, weight, blocks, threads=0))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
@@ -169,7 +169,7 @@ pub fn regression_factors<'py>(
     Ok((found.factor.into_pyarray(py).reshape(shape)?, found.lengths))
 }
 
-/// Standard inertial parameters of the loaded links, ten each, and the joints of the links.
+/// Inertial parameters of the links with mass, ten each, and the joints of these links.
 #[pyfunction]
 pub fn inertial_parameters<'py>(
     py: Python<'py>,

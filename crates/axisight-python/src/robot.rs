@@ -26,8 +26,8 @@ pub struct Robot {
     controller_speed: f64,
 }
 
-/// What pickle keeps of a robot: its text, the changes made to it, the speed of its controller,
-/// its effects, its operating point, whether its controller feeds speed forward.
+/// Pickled data of a robot: text, changed parameters, controller speed, effects, operating point,
+/// and whether the controller feeds speed forward.
 type Kept = (
     String,
     Vec<(String, f64)>,
@@ -47,7 +47,7 @@ type ModeArrays<'py> = (
     Matrix3<'py>,
 );
 
-/// What a description says of a joint, with the changes made since.
+/// Description of a joint, with the changes made since.
 fn joint_entry<'py>(py: Python<'py>, joint: &Joint) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
     out.set_item("name", &joint.name)?;
@@ -70,7 +70,7 @@ impl Robot {
         linearize(&self.description, &settings(effects), &at).map_err(input_error)
     }
 
-    /// Apply `f` to each row of `K` `(n, joints)` arrays of equal length; it fills a row of
+    /// Apply `f` to each row of `K` arrays `(n, joints)` of equal length. `f` fills a row of
     /// `width` numbers.
     fn each_row<'py, const K: usize>(
         &self,
@@ -103,7 +103,7 @@ impl Robot {
 
 #[pymethods]
 impl Robot {
-    /// Read a description in the format `axisight.robot/1`.
+    /// Read a description in the format `axisight.robot/1` or `axisight.robot/2`.
     #[staticmethod]
     fn from_toml(text: String) -> PyResult<Self> {
         let description = read_robot(&text).map_err(|e| RobotError::new_err(e.to_string()))?;
@@ -133,7 +133,8 @@ impl Robot {
         })
     }
 
-    /// The same robot with a controller for a loop `factor` times as fast as the stated one's.
+    /// The same robot with a controller for a loop that is `factor` times as fast as the stated
+    /// one.
     fn with_controller_speed(&self, factor: f64) -> PyResult<Self> {
         if !(factor > 0.0 && factor.is_finite()) {
             return Err(input_error(format!(
@@ -157,13 +158,13 @@ impl Robot {
         out.with_velocity_feedforward(on)
     }
 
-    /// Effects that the simulator of this robot has.
+    /// Effects that the robot's own simulator includes.
     #[getter]
     fn effects(&self) -> Vec<EffectTuple> {
         self.description.effects.iter().map(tuple).collect()
     }
 
-    /// The same robot with other effects of its own.
+    /// The same robot with other own effects.
     fn with_effects(&self, effects: Vec<EffectTuple>) -> PyResult<Self> {
         let mut description = self.description.clone();
         description.effects = settings(effects);
@@ -190,7 +191,7 @@ impl Robot {
         Ok(out)
     }
 
-    /// Whether a controller with targets of positions takes their rate as the reference of its speed.
+    /// Whether a controller of positions uses the rate of its references as speed reference.
     #[getter]
     fn velocity_feedforward(&self) -> bool {
         !matches!(
@@ -205,7 +206,8 @@ impl Robot {
         )
     }
 
-    /// Whether gains of a controller are of accelerations, which it makes torques of by the robot's dynamics.
+    /// Whether the gains of the controller give accelerations, which the robot's dynamics turn into
+    /// torques.
     #[getter]
     fn computed_torque(&self) -> bool {
         matches!(
@@ -217,8 +219,8 @@ impl Robot {
         )
     }
 
-    /// Step of the simulator that holds the controller's law [s], and what it adds to the inertia of each
-    /// motor [kg m^2]; nothing where it is a machine.
+    /// Step [s] of the simulator that executes the control law, and the inertia [kg m^2] that it
+    /// adds to each motor; None for a machine.
     #[getter]
     fn stepped(&self) -> Option<(f64, Vec<f64>)> {
         match &self.description.controller {
@@ -229,7 +231,8 @@ impl Robot {
         }
     }
 
-    /// The same robot whose controller with targets of positions has none of speed, or their rate.
+    /// The same robot, whose controller of positions has the rate of its references as speed
+    /// reference or not.
     fn with_velocity_feedforward(&self, on: bool) -> PyResult<Self> {
         let mut out = self.clone();
         match &mut out.description.controller {
@@ -248,13 +251,13 @@ impl Robot {
         Ok(out)
     }
 
-    /// Relative standard deviation of the robot's own parameters by quantity, where stated.
+    /// Relative tolerance of the robot's own parameters by quantity, if stated.
     #[getter]
     fn tolerances(&self) -> Vec<(String, f64)> {
         self.description.tolerances.clone()
     }
 
-    /// Rebuild a robot from what pickle kept of it.
+    /// Rebuild a robot from its pickled data.
     #[staticmethod]
     fn _restore(
         text: String,
@@ -403,7 +406,7 @@ impl Robot {
     fn gravity_m_s2(&self) -> [f64; 3] {
         self.description.gravity
     }
-    /// Every joint, base to tip, with its link, spring and drive.
+    /// Every joint from base to tip, with its link, spring and drive.
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let joints = self.description.joints.iter();
         joints.map(|joint| joint_entry(py, joint)).collect()
@@ -488,7 +491,7 @@ impl Robot {
             Ok(())
         })
     }
-    /// Rotation and origin of the frame of joint `joint` (0-based).
+    /// Rotation and origin of the frame of joint `joint`, counted from 0.
     fn pose<'py>(
         &self,
         py: Python<'py>,
@@ -568,8 +571,8 @@ impl Robot {
         ))
     }
 
-    /// Zero-order-hold response from motor torque to motor angle: `(n_freq, n_axes, 2 n_axes)`,
-    /// real and imaginary parts interleaved along the last axis; NaN at a pole.
+    /// Zero-order-hold response from motor torque to motor angle, `(n_freq, n_axes, 2 n_axes)`,
+    /// with real and imaginary parts interleaved along the last axis; NaN at a pole.
     #[pyo3(signature = (frequency_hz, effects, joint_angle=None))]
     fn zoh_response<'py>(
         &self,

@@ -1,4 +1,4 @@
-//! Simulation of many runs; one run is a batch of one.
+//! Simulation of many runs. A single run is a batch of one.
 
 use crate::convert::{array2, array3, planes};
 use crate::effects::{EffectTuple, settings};
@@ -11,7 +11,7 @@ use numpy::{PyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Integrator, as Python hands it over.
+/// Integrator, from Python.
 #[derive(FromPyObject)]
 pub struct IntegratorSpec {
     method: String,
@@ -20,7 +20,7 @@ pub struct IntegratorSpec {
 }
 
 impl IntegratorSpec {
-    /// `rk4` and `rkn4` with sub-steps, the others with a tolerance.
+    /// The method: `rk4` and `rkn4` take sub-steps, the others a tolerance.
     pub fn method(&self) -> PyResult<Method> {
         let (substeps, tolerance) = (self.substeps, self.tolerance);
         let controlled = match self.method.as_str() {
@@ -41,7 +41,7 @@ impl IntegratorSpec {
                 )));
             }
         };
-        // Below this the states cannot even be written down.
+        // Below this tolerance, states cannot even be represented.
         if (1e-14..1.0).contains(&tolerance) {
             Ok(controlled)
         } else {
@@ -52,13 +52,13 @@ impl IntegratorSpec {
     }
 }
 
-/// Refuse an integrator that no simulation would take.
+/// Refuse an invalid integrator.
 #[pyfunction]
 pub fn check_integrator(integrator: IntegratorSpec) -> PyResult<()> {
     integrator.method().map(|_| ())
 }
 
-/// Equations by name.
+/// Equations of the plant, by name.
 pub fn model(name: &str) -> PyResult<Model> {
     match name {
         "nonlinear" => Ok(Model::Nonlinear),
@@ -69,8 +69,8 @@ pub fn model(name: &str) -> PyResult<Model> {
     }
 }
 
-/// Position noise `(n_samples, n_axes)` as a function of seed and run; white, or of first
-/// order with a cutoff.
+/// Position noise `(n_samples, n_axes)` as a function of seed and run: white, or of first order
+/// with a cutoff.
 #[pyfunction]
 #[pyo3(signature = (seed, run, n_samples, n_axes, std, *, cutoff_hz=None, sample_time=None))]
 #[allow(clippy::too_many_arguments)] // arguments of a binding
@@ -98,7 +98,7 @@ pub fn measurement_noise(
     array2(py, noise, n_axes)
 }
 
-/// How to simulate, apart from inputs.
+/// Options of a simulation, apart from inputs.
 struct Options {
     reference: bool,
     start: Option<Vec<Vec<f64>>>,
@@ -108,7 +108,7 @@ struct Options {
     threads: usize,
 }
 
-/// Simulate runs from rest; the shape of the inputs is `(n_runs, n_samples, n_axes)`.
+/// Simulate runs from rest, with inputs of the shape `(n_runs, n_samples, n_axes)`.
 #[pyfunction]
 #[pyo3(signature = (robot, effects, input, *, reference, integrator, noise=None, start=None, model="nonlinear", resolution=0.0, threads=0, cancel=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
@@ -186,7 +186,7 @@ fn run(
     done.map_err(input_error)
 }
 
-/// Name of a status and the sample it speaks of.
+/// Name of a status, and the sample to which it refers.
 fn status(status: Status) -> (&'static str, Option<usize>) {
     match status {
         Status::Completed => ("completed", None),

@@ -1,9 +1,9 @@
-//! Forward-mode derivatives: a value and its partials along some seeds.
+//! Forward-mode automatic differentiation: a value and its partial derivatives along given seeds.
 
 use super::{Partials, Scalar};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// `value + sum_i partials[i] eps_i` with `eps_i eps_j = 0`; `P` is where the partials are kept.
+/// A dual number `value + sum_i partials[i] eps_i` with `eps_i eps_j = 0`; `P` stores the partials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DualNumber<R, P> {
     /// Primal value.

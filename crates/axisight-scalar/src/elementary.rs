@@ -1,9 +1,11 @@
-//! Elementary functions without branches, so that a loop over lanes becomes
-//! vector instructions and a run gives the same bits in any lane width.
+//! Elementary functions without branches.
 //!
-//! Argument reduction after Cody and Waite (1980), *Software Manual for the
-//! Elementary Functions*; the polynomials are the Taylor ones on the reduced
-//! interval, carried to where their remainder is below one rounding.
+//! Without branches, a loop over lanes becomes vector instructions, and a run gives the same bits
+//! at any lane width.
+//!
+//! Argument reduction follows Cody and Waite (1980), *Software Manual for the Elementary
+//! Functions*. The polynomials are Taylor polynomials on the reduced interval. Their order makes
+//! the remainder smaller than one rounding error.
 
 use super::Scalar;
 
@@ -13,11 +15,11 @@ const HALF_PI_1: f64 = 1.570_796_326_734_125_6;
 const HALF_PI_2: f64 = 6.077_100_506_303_966e-11;
 const HALF_PI_3: f64 = 2.022_266_248_795_950_6e-21;
 
-/// What the functions need beyond [`Scalar`]; numbers without derivatives have it.
+/// Operations that the functions need beyond [`Scalar`], for numbers without derivatives.
 pub(super) trait Real: Scalar {
     /// The nearest whole number, ties to even.
     fn round(self) -> Self;
-    /// The largest whole number not above.
+    /// The largest whole number that is not above `self`.
     fn floor(self) -> Self;
     /// `2^self` for a whole number from -1022 to 1023.
     fn two_to_the(self) -> Self;
@@ -67,7 +69,7 @@ pub(super) fn sin_cos<R: Real>(x: R) -> (R, R) {
     // Quadrant modulo 4 is 0, 1, 2 or 3; halves fall between them.
     let q = (quadrant * 0.25).floor().fma(R::constant(-4.0), quadrant);
     let middle = (q - 1.5).abs() - 1.0;
-    // `middle` is 0.5 for quadrants 0 and 3, -0.5 for 1 and 2; odd ones swap sine and cosine.
+    // `middle` is 0.5 for quadrants 0 and 3, -0.5 for 1 and 2. Odd quadrants swap sine and cosine.
     let odd = -((q - 2.0).abs() - 1.0).abs() + 0.5;
     let (sin, cos) = (odd.if_positive(c, s), odd.if_positive(s, c));
     let sin = (q - 1.5).if_positive(-sin, sin);
@@ -120,7 +122,7 @@ const EXPONENTIAL: [f64; 14] = [
 #[inline(always)]
 pub(super) fn exp<R: Real>(x: R) -> R {
     let limit = R::constant(708.0);
-    // A comparison with NaN is false: it passes through all three choices.
+    // A comparison with NaN is false, so NaN passes through all three choices.
     let below = (x - limit).if_positive(limit, x);
     let clamped = (-limit - below).if_positive(-limit, below);
     let n = (clamped * std::f64::consts::LOG2_E).round();

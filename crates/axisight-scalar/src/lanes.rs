@@ -1,4 +1,4 @@
-//! Several runs in lock-step, one per lane.
+//! Several runs in lock-step, one in each lane.
 
 use super::Scalar;
 use super::elementary;

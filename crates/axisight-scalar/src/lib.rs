@@ -1,11 +1,16 @@
-//! One model, several scalars.
+//! The scalar types over which a model is evaluated.
 //!
-//! Equations of motion and effects are written once over [`Scalar`]: `f64`
-//! for one run, [`Lanes`] for several runs in lock-step, [`Dual`] for exact
-//! derivatives, and `Dual<Lanes<L>, N>` for both. The derivatives of a [`DualNumber`] stand in
-//! an array ([`Dual`]) or in one vector register, see [`Partials`].
+//! Equations of motion and effects are written once over [`Scalar`]. They then run with:
+//!
+//! * `f64` for one run,
+//! * [`Lanes`] for several runs in lock-step,
+//! * [`Dual`] for exact derivatives,
+//! * `Dual<Lanes<L>, N>` for several runs with derivatives.
+//!
+//! The derivatives of a [`DualNumber`] are stored in an array ([`Dual`]) or in one vector register,
+//! see [`Partials`].
 
-// Kernels are generic over the scalar and must be inlined to become vector code.
+// Kernels are generic over the scalar and become vector code only if they are inlined.
 #![allow(clippy::inline_always)]
 
 mod dual;
@@ -25,7 +30,7 @@ pub use register::{MOST_LANES, Register};
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// A number the models can be evaluated with.
+/// A number with which the models can be evaluated.
 pub trait Scalar:
     Copy
     + Debug
@@ -45,9 +50,9 @@ pub trait Scalar:
 {
     /// The same number without its derivatives.
     type Real: Scalar;
-    /// Number of runs carried in lock-step.
+    /// Number of runs in lock-step.
     const LANES: usize;
-    /// Number of partial derivatives carried.
+    /// Number of partial derivatives of each value.
     const PARTIALS: usize;
 
     /// The same constant in every lane, with zero derivatives.
@@ -60,22 +65,23 @@ pub trait Scalar:
     fn real(self) -> Self::Real;
     /// The value in one lane.
     fn lane(&self, lane: usize) -> f64;
-    /// The derivative with respect to seed `partial` in one lane; zero if none is carried.
+    /// The derivative with respect to seed `partial` in one lane; zero if the number has no such
+    /// derivative.
     fn partial(&self, partial: usize, lane: usize) -> f64;
-    /// The same number with derivative one with respect to seed `partial`.
+    /// The same number, with derivative one with respect to seed `partial`.
     #[must_use]
     fn seeded(self, partial: usize) -> Self;
 
     /// `self * b + c` with one rounding per operation of the hardware.
     #[must_use]
     fn fma(self, b: Self, c: Self) -> Self;
-    /// `a * self + y` as [`Scalar::fma`], cheaper because `a` carries no derivatives.
+    /// `a * self + y` as [`Scalar::fma`]; cheaper because `a` has no derivatives.
     #[must_use]
     #[inline(always)]
     fn axpy(self, a: f64, y: Self) -> Self {
         self.fma(Self::constant(a), y)
     }
-    /// `self * a + c` as [`Scalar::fma`], cheaper because `a` carries no derivatives.
+    /// `self * a + c` as [`Scalar::fma`]; cheaper because `a` has no derivatives.
     #[must_use]
     fn fma_real(self, a: Self::Real, c: Self) -> Self;
     /// Reciprocal.
@@ -99,7 +105,7 @@ pub trait Scalar:
     /// Hyperbolic tangent; absolute error below 5e-16.
     #[must_use]
     fn tanh(self) -> Self;
-    /// `a` in the lanes where `self > 0`, `b` elsewhere (also where `self` is NaN).
+    /// `a` in the lanes where `self > 0`, `b` in all others, also where `self` is NaN.
     #[must_use]
     fn if_positive(self, a: Self, b: Self) -> Self;
 
@@ -178,7 +184,7 @@ impl Scalar for f64 {
     }
     #[inline(always)]
     fn sin_cos_each(x: &[Self], out: &mut [(Self, Self)]) {
-        // Four at a time cost as much as one, and give the same bits.
+        // Four sines cost as much as one and have the same bits.
         for (x, out) in x.chunks(4).zip(out.chunks_mut(4)) {
             let (s, c) = Lanes::<4>::from_lanes(|i| x.get(i).copied().unwrap_or(0.0)).sin_cos();
             for (i, out) in out.iter_mut().enumerate().take(4) {

@@ -1,5 +1,5 @@
-//! Where a dual number keeps its partial derivatives: an array of any scalar, or the lanes of
-//! one vector register of doubles.
+//! Storage of the partial derivatives of a dual number: an array of any scalar, or the lanes of one
+//! vector register of doubles.
 
 use super::{Register, Scalar};
 use std::fmt::Debug;
@@ -31,13 +31,13 @@ pub trait Partials<R>: Copy + Debug + Send + Sync + 'static {
     fn if_positive(condition: R, a: Self, b: Self) -> Self;
     /// The derivative along seed `i`, if there is such a seed.
     fn along(&self, i: usize) -> Option<R>;
-    /// Derivative one along seed `i`; nothing happens if there is no such seed.
+    /// The same derivatives with one along seed `i`; unchanged if there is no such seed.
     #[must_use]
     fn seeded(self, i: usize) -> Self;
 }
 
-/// `[expression; N]` with an index. A plain loop: of the closures of `from_fn`, which the compiler
-/// takes longer over, some stay calls.
+/// `[expression; N]` with an index, as a plain loop. `array::from_fn` takes longer to compile, and
+/// some of its closures are not inlined.
 macro_rules! each {
     ($i:ident, $expression:expr) => {{
         let mut out = [R::zero(); N];
@@ -94,8 +94,8 @@ impl<R: Scalar, const N: usize> Partials<R> for [R; N] {
     }
 }
 
-/// One register holds them all, which the compiler keeps where it is through a whole step of
-/// an integrator; of an array it would move some through memory.
+/// All partials in one register. The compiler keeps the register in place through a whole step of
+/// an integrator, while it moves parts of an array through memory.
 impl<V: Register> Partials<f64> for V {
     const COUNT: usize = V::LANES;
 

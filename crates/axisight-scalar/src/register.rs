@@ -1,5 +1,5 @@
-//! One vector register of doubles behind one name, so that a kernel is compiled for several
-//! widths and the widest that the processor has is chosen when it runs.
+//! One trait for vector registers of doubles, so that a kernel is compiled for several widths. The
+//! widest width that the processor has is chosen at run time.
 
 use super::{Lanes, Scalar};
 use nalgebra::Complex;
@@ -9,10 +9,10 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 type C = Complex<f64>;
 
-/// Most lanes of any register.
+/// The largest number of lanes of any register.
 pub const MOST_LANES: usize = 8;
 
-/// `LANES` doubles; arithmetic is elementwise, with the same bits at any width.
+/// `LANES` doubles with elementwise arithmetic; results have the same bits at any width.
 pub trait Register:
     Copy
     + Debug
@@ -24,13 +24,13 @@ pub trait Register:
     + Mul<Output = Self>
     + Neg<Output = Self>
 {
-    /// Doubles held.
+    /// Number of doubles in the register.
     const LANES: usize;
     /// The same number in every lane.
     fn splat(x: f64) -> Self;
-    /// The first numbers of a slice.
+    /// Load the first `LANES` numbers of a slice.
     fn load(from: &[f64]) -> Self;
-    /// Into the first places of a slice.
+    /// Store to the first `LANES` places of a slice.
     fn store(self, to: &mut [f64]);
     /// `self * b + c` with one rounding.
     #[must_use]
@@ -47,20 +47,20 @@ pub trait Register:
     /// `a` where `self > 0`, `b` elsewhere, also where `self` is NaN.
     #[must_use]
     fn if_positive(self, a: Self, b: Self) -> Self;
-    /// The power of two at or below a positive number, inverted; other numbers give zero,
+    /// Inverse of the largest power of two not above a positive number. Other numbers give zero,
     /// infinity or NaN.
     #[must_use]
     fn inverse_power_of_two(self) -> Self;
-    /// Real and imaginary parts of the numbers `step` apart.
+    /// Real and imaginary parts of `LANES` numbers that lie `step` apart in `from`.
     fn split(from: &[C], step: usize) -> (Self, Self);
     /// The inverse of `split`.
     fn join(re: Self, im: Self, to: &mut [C], step: usize);
 }
 
-/// Bits of the exponent.
+/// Bit mask of the exponent.
 pub(super) const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
 
-/// `L` up to [`MOST_LANES`], in registers of 256 bits.
+/// `L` lanes, at most [`MOST_LANES`], in registers of 256 bits.
 impl<const L: usize> Register for Lanes<L> {
     const LANES: usize = L;
 

@@ -1,11 +1,13 @@
 //! Elementwise arithmetic on arrays in 256-bit registers.
 //!
-//! Left to itself the compiler turns only some loops over lanes into vector
-//! instructions, and moves the rest through memory.
+//! The compiler alone turns only some loops over lanes into vector instructions, and moves the
+//! other lanes through memory.
 
-/// One operation on `[f64; L]` from the instruction for four of them and the
-/// plain operation for the rest. The fours are written out: a loop over them costs the compiler
-/// several times as much, because it has to be unrolled before the numbers leave memory.
+/// One operation on `[f64; L]`: a packed instruction for each group of four, the plain operation
+/// for the rest.
+///
+/// The groups are written out, because a loop over them takes several times as long to compile: the
+/// compiler has to unroll it before the numbers can stay in registers.
 macro_rules! operation {
     ($(#[$doc:meta])* $name:ident ( $($argument:ident),+ ), $packed:expr, $plain:expr) => {
         $(#[$doc])*
@@ -75,7 +77,7 @@ operation!(
     |a: f64| a.abs()
 );
 operation!(
-    /// The larger; `b` where either is NaN.
+    /// The larger of `a` and `b`; `b` where either is NaN.
     larger(a, b),
     |a, b| _mm256_max_pd(a, b),
     |a: f64, b: f64| if a > b { a } else { b }

@@ -1,8 +1,8 @@
-//! Eight doubles in a register of 512 bits, on processors that have them.
+//! Eight doubles in a register of 512 bits, on processors that have such registers.
 //!
-//! The package is compiled for 256 bits. Functions with
-//! `#[target_feature(enable = "avx512f,avx512dq")]`, entered only where [`available`] says
-//! so, may use this type: everything here is inlined into them.
+//! The package is compiled for 256 bits. Only functions with
+//! `#[target_feature(enable = "avx512f,avx512dq")]` may use this type, and callers enter them only
+//! if [`available`] returns true. Everything here is inlined into these functions.
 
 use super::register::{EXPONENT, Register};
 use nalgebra::Complex;
@@ -17,7 +17,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 type C = Complex<f64>;
 
-/// Whether the processor has such registers.
+/// Whether the processor has the instruction sets AVX-512F and AVX-512DQ.
 pub fn available() -> bool {
     is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq")
 }
@@ -26,11 +26,11 @@ pub fn available() -> bool {
 #[derive(Debug, Clone, Copy)]
 pub struct Wide(__m512d);
 
-/// An expression of instructions that only functions behind [`available`] reach.
+/// An expression of instructions that run only after [`available`] returned true.
 macro_rules! instructions {
     ($e:expr) => {{
-        // SAFETY: the instructions exist, see the head of this file; slices are checked for
-        // their length before, and the unaligned instructions take any address.
+        // SAFETY: the processor has the instructions, see the top of this file. The lengths of
+        // slices are checked before, and the unaligned instructions take any address.
         #[allow(unsafe_code)]
         unsafe {
             $e

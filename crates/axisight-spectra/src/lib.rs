@@ -1,9 +1,9 @@
-//! Frequency responses and the signals they are measured with: excitation design, estimators
-//! with their uncertainty, and the seeded streams and accumulators of ensembles.
+//! Frequency responses and the signals for measuring them: excitation design, estimators with
+//! uncertainty, and seeded streams and accumulators of ensembles.
 //!
-//! Knows nothing of robots: records in, responses out.
+//! The crate contains no robot model: it turns records into responses.
 
-// Kernels are generic over the scalar and must be inlined to become vector code.
+// Kernels are generic over the scalar and become vector code only if they are inlined.
 #![allow(clippy::inline_always)]
 
 pub mod ensemble;

@@ -1,4 +1,4 @@
-"""What the methods share: experiments checked together, orders broadcast, fits in per cent."""
+"""Shared by all methods: checks of experiments and orders, fits in per cent."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Integers = NDArray[np.int64]
 
 
 def gathered(experiments: Experiment | Sequence[Experiment], name: str) -> list[Experiment]:
-    """Return one or several experiments as a list, all of one sample time and size."""
+    """Return one or several experiments as a list; they must share sample time and channels."""
     found = [experiments] if isinstance(experiments, Experiment) else list(experiments)
     if not found:
         raise InputError(f"{name}: expected at least one experiment, got none")
@@ -40,7 +40,7 @@ def gathered(experiments: Experiment | Sequence[Experiment], name: str) -> list[
 
 
 def order_matrix(name: str, value: ArrayLike, shape: tuple[int, int], least: int) -> Integers:
-    """Return orders or delays broadcast to one per pair, not below ``least``."""
+    """Return orders or delays broadcast to ``shape``, none below ``least``."""
     array = np.asarray(value)
     if array.dtype.kind not in "iu":
         raise InputError(f"{name}: expected whole numbers, got {value!r}")

@@ -1,4 +1,4 @@
-"""Discrete linear models in state space: what every method of this package can become."""
+"""Discrete linear state-space models, to which every time-domain method here converts."""
 
 from __future__ import annotations
 
@@ -55,21 +55,21 @@ class StateSpaceModel:
         return bool(np.all(np.abs(np.linalg.eigvals(self.a)) < 1)) if self.order else True
 
     def modes(self) -> xr.Dataset:
-        """Return what the poles are in continuous time, slowest first.
+        """Return the poles as modes of continuous time, slowest first.
 
-        Variables ``pole`` (z), ``eigenvalue_rad_s`` (ln z / T), ``frequency_hz`` and
-        ``damping_ratio`` over ``mode``; one of each complex pair. A pole at zero is a delay
-        and is left out.
+        Variables over ``mode``: ``pole`` (z), ``eigenvalue_rad_s`` (ln z / T), ``frequency_hz`` and
+        ``damping_ratio``. A complex pair is one mode. Poles at zero are delays and are left out.
         """
         return modes_of(self.poles, self.sample_time_s)
 
     def response(
         self, frequency_hz: ArrayLike, *, input_unit: str = "Nm", output_unit: str = "rad"
     ) -> xr.Dataset:
-        """Return G(e^{iwT}) at the lines, as `axisight.frf.frequency_response`.
+        """Return G(e^{iwT}) in the format of `axisight.frf.frequency_response`.
 
         ``frequency_hz`` [Hz] ascends, up to Nyquist; ``input_unit`` and ``output_unit`` are
-        labels. The variance is NaN: these matrices carry none. A line on a pole is NaN.
+        labels. The variance is NaN, because the matrices have none. A line on a pole is NaN. Raises
+        InputError for other frequencies.
         """
         f = lines(frequency_hz, self.sample_time_s)
         z = np.exp(2j * np.pi * f * self.sample_time_s)
@@ -83,9 +83,10 @@ class StateSpaceModel:
         )
 
     def simulate(self, experiment: Experiment, initial_state: ArrayLike | None = None) -> Real:
-        """Return the output (n, p) for the input of ``experiment``, without its output.
+        """Return the simulated output (n, p) for the input of ``experiment`` alone.
 
-        ``initial_state`` (n_states,), by default zero: at rest.
+        ``initial_state`` (n_states,) is zero, at rest, by default. Raises InputError for another shape,
+        and if channels or sample time differ from the model's.
         """
         self._expect(experiment)
         return _run(self.a, self.b, self.c, self.d, experiment.input, self._start(initial_state))
@@ -93,7 +94,7 @@ class StateSpaceModel:
     def predict(self, experiment: Experiment, initial_state: ArrayLike | None = None) -> Real:
         """Return the one-step prediction (n, p), Wernholt (2004), (3.33).
 
-        ``experiment`` gives input and output; ``initial_state`` as in `simulate`.
+        ``experiment`` gives input and output; ``initial_state`` and errors as in `simulate`.
         """
         self._expect(experiment)
         both = np.hstack([experiment.input, experiment.output])
@@ -103,11 +104,11 @@ class StateSpaceModel:
         return _run(a, b, self.c, d, both, self._start(initial_state))
 
     def to_scipy(self) -> signal.StateSpace:
-        """Return a discrete ``scipy.signal.StateSpace``; the noise model has no place there."""
+        """Return a discrete ``scipy.signal.StateSpace``, without the noise model."""
         return signal.StateSpace(self.a, self.b, self.c, self.d, dt=self.sample_time_s)
 
     def to_control(self) -> Any:
-        """Return a ``control.StateSpace``; the noise model has no place there.
+        """Return a ``control.StateSpace``, without the noise model.
 
         Raises MissingExtraError without python-control.
         """
@@ -126,7 +127,7 @@ class StateSpaceModel:
 
 
 def expect_experiment(experiment: Experiment, n_in: int, n_out: int, sample_time_s: float) -> None:
-    """Raise InputError where an experiment does not fit the model."""
+    """Raise InputError if channels or sample time of an experiment differ from the model's."""
     got = (experiment.input.shape[1], experiment.output.shape[1])
     if got != (n_in, n_out):
         raise InputError(
@@ -152,7 +153,7 @@ def evaluate(a: Real, b: Real, c: Real, d: Real, at: Complex) -> Complex:
 
 
 def modes_of(poles: Complex, sample_time_s: float | None) -> xr.Dataset:
-    """Return the modes of discrete poles, or of continuous ones without a sample time."""
+    """Return the modes of discrete poles, or of continuous poles if ``sample_time_s`` is None."""
     upper = poles[(poles.imag >= 0) & ((sample_time_s is None) | (np.abs(poles) > 1e-12))]
     rate = upper if sample_time_s is None else np.log(upper) / sample_time_s
     order = np.argsort(np.abs(rate), kind="stable")
@@ -170,7 +171,7 @@ def modes_of(poles: Complex, sample_time_s: float | None) -> xr.Dataset:
 
 
 def control_module() -> Any:
-    """Return the module of the optional extra."""
+    """Return the module ``control``; raises MissingExtraError if it is not installed."""
     try:
         return importlib.import_module("control")
     except ImportError as error:

@@ -12,7 +12,7 @@ from scipy.linalg import lapack
 from axisight.blackbox._data import Real
 
 BAND_NUMBERS = 1 << 17
-"""Numbers of the band at a time, so that it stays in the cache; longer records go in blocks."""
+"""Entries of the band in one block, so that the band stays in the cache."""
 
 
 def states(a: Real, drive: Real, start: Real) -> Real:
@@ -21,7 +21,7 @@ def states(a: Real, drive: Real, start: Real) -> Real:
     a
         (n_states, n_states).
     drive
-        v(t), (n_samples, n_states, n_columns): every column is a motion of its own.
+        v(t), (n_samples, n_states, n_columns); every column is a separate motion.
     start
         x(0), (n_states, n_columns).
     """
@@ -31,7 +31,7 @@ def states(a: Real, drive: Real, start: Real) -> Real:
     if n == 0 or samples == 0:
         return out
     block = min(samples, max(1, BAND_NUMBERS // (2 * n * n)))
-    # Column i of the block of one sample: one on the diagonal, -A in the rows of the next sample.
+    # Banded storage: one on the diagonal, -A in the rows of the next sample.
     one = np.zeros((2 * n, n))
     one[0] = 1.0
     row, column = np.indices((n, n))

@@ -1,9 +1,9 @@
-"""Poles as sections of first and second order, and the linear problem they leave.
+"""Poles as sections of first and second order, and the linear problem of their residues.
 
-Everything happens in one variable x, in which an integrator is a pole at zero: s / w0 in
-continuous time and (z - 1) / (T w0) in discrete time, which tends to the former as T does to
-zero and loses no digits when T is short. A section of second order, x^2 + b x + c, holds a
-complex pair, two real poles, and everything between without a seam.
+All fits use one variable x, in which an integrator is a pole at zero: s / w0 in continuous time and
+(z - 1) / (T w0) in discrete time. The second tends to the first as T tends to zero, and loses no
+digits when T is short. A section of second order, x^2 + b x + c, holds a complex pair or two real
+poles, and passes smoothly from one to the other.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Domain:
         return np.asarray(np.expm1(s * self.sample_time_s) / self.step)
 
     def natural(self, x: Complex) -> Complex:
-        """Return poles as users have them: s [rad/s], or z."""
+        """Return poles as s [rad/s], or as z in discrete time."""
         return np.asarray(x * self.scale_rad_s if self.sample_time_s is None else 1 + self.step * x)
 
     def rate(self, x: Complex) -> tuple[Complex, Complex]:
@@ -59,7 +59,7 @@ class Domain:
         return bool(np.all(np.abs(1 + self.step * x) < 1))
 
     def stabilized(self, x: Complex) -> Complex:
-        """Return the poles with unstable ones mirrored at the border, and none upon it."""
+        """Return the poles with unstable ones mirrored, and none on the stability border."""
         if self.sample_time_s is None:
             real = -np.maximum(np.abs(x.real), LEAST_DAMPING * np.abs(x))
             return np.asarray(real + 1j * x.imag)
@@ -71,7 +71,7 @@ class Domain:
 
 
 LEAST_DAMPING = 1e-6
-"""A mirrored pole keeps at least this damping ratio."""
+"""Least damping ratio of a mirrored pole."""
 
 
 @dataclass(frozen=True)
@@ -109,10 +109,10 @@ class Sections:
         return cls(np.array(pairs, float).reshape(-1, 2), -real[even:])
 
     def poles(self) -> Complex:
-        """Return the poles, both of each section in a row."""
+        """Return the poles; the two of a section follow each other."""
         out: list[complex] = []
         for b, c in self.quadratic:
-            # The root of larger size first; the other from the product, without cancellation.
+            # The other root follows from the product, which avoids cancellation.
             root = np.sqrt(complex(b * b / 4 - c))
             first = -b / 2 + (root if b < 0 else -root)
             out += [first, c / first if root.imag == 0 and first != 0 else np.conj(first)]
@@ -154,9 +154,9 @@ class Sections:
 class Weighted:
     """Elements of a response, each as rows of real numbers with its own weights.
 
-    ``x`` (n_freq,), ``values`` (n_freq, n_elements), ``weight`` real of the same shape, ``extra``
-    the columns that every model has: powers 1/x, 1/x^2 and one. ``spread``, shaped as ``weight``,
-    is the variance that the real and the imaginary part of a weighted residual should have.
+    ``x`` (n_freq,), ``values`` (n_freq, n_elements), and ``weight``, real, of the same shape.
+    ``extra`` are the columns without poles to fit: 1/x, 1/x^2 and one, as chosen. ``spread``, shaped
+    as ``weight``, is the expected variance of the real or imaginary part of a weighted residual.
     """
 
     x: Complex
@@ -172,7 +172,7 @@ class Weighted:
 
     @property
     def targets(self) -> Real:
-        """Weighted values, real parts over imaginary ones, (n_elements, 2 n_freq)."""
+        """Weighted values, real parts followed by imaginary parts, (n_elements, 2 n_freq)."""
         return self.rows(self.values.T[:, :, None])[:, :, 0]
 
     def rows(self, columns: Complex) -> Real:

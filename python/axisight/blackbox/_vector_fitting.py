@@ -17,13 +17,13 @@ from axisight.blackbox._sections import Domain, Sections, Weighted
 from axisight.statistics.least_squares import scaled_solution
 
 SMALL_CONSTANT = 1e-8
-"""A smaller d would throw the zeros of sigma to infinity."""
+"""Least size of d; a smaller one would move the zeros of sigma to infinity."""
 
 ROUNDING = 1e-14
 """Share of the largest singular value below which a direction is rounding."""
 
 NO_RATE = 1e-12
-"""Size of a pole that is at zero but for rounding."""
+"""Poles below this size are at zero, apart from rounding."""
 
 
 def relocated(problem: Weighted, sections: Sections) -> Complex:
@@ -35,10 +35,10 @@ def relocated(problem: Weighted, sections: Sections) -> Complex:
     g = problem.values.T[:, :, None]
     known = np.broadcast_to(columns, (len(g), *columns.shape))
     rows = problem.rows(np.concatenate([known, -basis * g, -g], axis=2))
-    # Of each element only what its own numerators cannot explain is left.
+    # QR eliminates the numerators of each element.
     r = np.asarray(np.linalg.qr(rows, mode="r"))
     stacked = r[:, n_known:, n_known:].reshape(-1, n + 1)
-    # The constraint, as heavy as the data.
+    # The constraint gets the weight of the data.
     weight = np.linalg.norm(stacked[:, n]) / len(x)
     constraint = weight * np.concatenate([basis.real.sum(axis=0), [len(x)]])
     target = np.zeros(len(stacked) + 1)
@@ -73,13 +73,13 @@ def fitted(
 
 
 def _conjugate(poles: Complex) -> Complex:
-    """Return the poles with those of nearly no imaginary part made real."""
+    """Return the poles, made real where the imaginary part is nearly zero."""
     real = np.abs(poles.imag) <= 1e-12 * np.abs(poles)
     return np.asarray(np.where(real, poles.real + 0j, poles))
 
 
 def _moved(old: Complex, new: Complex) -> float:
-    # The band lies about one: a pole that is this much slower is one at zero.
+    # The band lies about one, so a pole this much slower counts as zero.
     size = np.maximum(np.abs(new), NO_RATE)
     distance = np.abs(old[:, None] - new[None, :]) / size[None, :]
     return float(np.max(np.min(distance, axis=0)))

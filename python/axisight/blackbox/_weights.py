@@ -25,10 +25,12 @@ Weighting = Literal["variance", "relative", "absolute"]
 
 @dataclass(frozen=True)
 class UsableLines:
-    """Lines that are numbers, (n_freq,) and (n_freq, n_out, n_in), and what their weights rest on.
+    """Finite lines of a response, and the data of their weights.
 
-    ``variance`` is None unless it weighs; ``degrees_of_freedom`` complex, of the variance, None if
-    it is known. ``neighbours``: how many other lines say the weight of one, 0 for its own.
+    ``frequency_hz`` (n_freq,) and ``values`` (n_freq, n_out, n_in). ``variance`` is None unless it
+    sets the weights. ``degrees_of_freedom`` are complex ones of the variance, None if the variance
+    is known. ``neighbours`` is the number of other lines that set the weight of a line; with 0 a line
+    is weighted by its own variance.
     """
 
     frequency_hz: Real
@@ -40,15 +42,15 @@ class UsableLines:
 
     @property
     def own(self) -> OwnWeights:
-        """What weights from the lines' own variances do; nothing if they are known or pooled."""
+        """Corrections for weights from the lines' own variances; none for known or pooled ones."""
         if self.variance is None or self.neighbours:
             return OwnWeights()
         return OwnWeights.of(self.degrees_of_freedom)
 
     def weights(self, magnitude: Real) -> tuple[Real, Real]:
-        """Return weights and the variance of weighted residuals (real and imaginary part each).
+        """Return the weights, and the variance of the real or imaginary part of a weighted residual.
 
-        ``magnitude`` of the response, as the best model at hand has it.
+        ``magnitude`` is that of the response, from the best model so far.
         """
         if self.variance is None:
             weight = 1 / np.abs(self.values) if self.weighting == "relative" else 1.0
@@ -63,7 +65,7 @@ class UsableLines:
 
 
 def usable_lines(response: xr.Dataset, weighting: str, neighbours: int | None) -> UsableLines:
-    """Return the lines of a response that are numbers; raises InputError if there are none."""
+    """Return the finite lines of a response; raises InputError if there are none."""
     check_neighbours(neighbours)
     if neighbours and weighting != "variance":
         raise InputError(

@@ -72,11 +72,12 @@ class Triangle:
 class ARXModel:
     """An ARX model with its uncertainty.
 
-    ``na`` (p, p), ``nb`` and ``nk`` (p, m) are the orders; ``a`` (lags, p, p) and ``b``
-    (lags, p, m) the coefficients by lag from 0, a[0] the identity. ``names`` (``A12[1]``:
-    equation of output 1, output 2, lag 1), ``values``, ``covariance`` run over all parameters,
-    one output after the other. ``noise_covariance`` (p, p) of e; ``n_rows`` equations were used.
-    ``condition`` is that of the regressors scaled to unit norm, the worst over the outputs.
+    For p outputs and m inputs, ``na`` (p, p), ``nb`` and ``nk`` (p, m) are the orders. ``a``
+    (lags, p, p) and ``b`` (lags, p, m) are the coefficients by lag from 0; a[0] is the identity.
+    ``names`` (``A12[1]``: equation of output 1, output 2, lag 1), ``values`` and ``covariance`` run
+    over all parameters, one output after the other. ``noise_covariance`` (p, p) is that of e, and
+    ``n_rows`` counts the equations used. ``condition`` is the largest condition number of the
+    regressors, scaled to unit norm, over the outputs.
     """
 
     sample_time_s: float
@@ -96,7 +97,7 @@ class ARXModel:
 
     @property
     def std(self) -> Real:
-        """Standard errors of ``values``: white residuals assumed, as the model has it."""
+        """Standard errors of ``values``, for white residuals."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
@@ -123,10 +124,11 @@ class ARXModel:
     def response(
         self, frequency_hz: ArrayLike, *, input_unit: str = "Nm", output_unit: str = "rad"
     ) -> xr.Dataset:
-        """Return G(e^{iwT}) = A^-1 B with its variance, as `axisight.frf.frequency_response`.
+        """Return G(e^{iwT}) = A^-1 B and its variance, in the format of `axisight.frf.frequency_response`.
 
         ``frequency_hz`` [Hz] ascends, up to Nyquist; ``input_unit`` and ``output_unit`` are
-        labels. The variance follows from the covariance of the parameters to first order.
+        labels. The variance follows from the covariance of the parameters to first order. Raises
+        InputError for other frequencies.
         """
         f = lines(frequency_hz, self.sample_time_s)
         z = np.exp(2j * np.pi * f * self.sample_time_s)
@@ -157,9 +159,10 @@ class ARXModel:
         return response_variance(slope, self.covariance)
 
     def predict(self, experiment: Experiment) -> Real:
-        """Return the one-step prediction (n, p), (3.35); NaN before the largest lag.
+        """Return the one-step prediction (n, p) by (3.35), NaN before the largest lag.
 
-        ``experiment`` gives input and output.
+        ``experiment`` gives input and output. Raises InputError if its channels or sample time differ
+        from the model's.
         """
         n_in = self.b.shape[2]
         expect_experiment(experiment, n_in, self.a.shape[1], self.sample_time_s)
@@ -181,7 +184,7 @@ class ARXModel:
         return self.to_state_space().simulate(experiment)
 
     def to_state_space(self) -> StateSpaceModel:
-        """Return the same model in innovations form, p times the largest lag states."""
+        """Return the same model in innovations form, with p times the largest lag as its order."""
         p, m = self.b.shape[1:]
         lags = max(len(self.a), len(self.b)) - 1
         a = np.concatenate([self.a[1:], np.zeros((lags + 1 - len(self.a), p, p))])
@@ -209,8 +212,8 @@ def arx(
     """Return the least-squares ARX model of one or several experiments, (3.38) by QR.
 
     experiments
-        `axisight.records.experiment.Experiment`, of one sample time and size. Take offsets
-        off before: the model has none.
+        `axisight.records.experiment.Experiment`, all with the same sample time and channels.
+        Subtract offsets first: the model has none.
     na
         Lags of outputs, one number or (p, p).
     nb, nk

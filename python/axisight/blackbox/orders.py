@@ -26,7 +26,7 @@ def arx_orders(
     nk: Iterable[int] = (1,),
     validation: Experiment | Sequence[Experiment] | None = None,
 ) -> xr.Dataset:
-    """Return a table of ARX orders, every combination, all judged on the same samples.
+    """Return a table of criteria for every combination of ARX orders, all on the same samples.
 
     experiments
         Data to fit, as in `axisight.blackbox.arx`.
@@ -44,8 +44,8 @@ def arx_orders(
     det L (1 + d/N) / (1 - d/N), with d / p for p outputs (Ljung, 1999, chapter 16)
     - ``status``: ``estimated``, or ``rank_deficient`` (the rest is NaN)
 
-    ``attrs["best_aic"]`` and so on give the place of the smallest; -1 where there is none.
-    AIC and FPE tend to a high order with much data, BIC to the true one if it is among them.
+    ``attrs["best_aic"]`` and so on give the position of the smallest value, -1 if there is none.
+    With much data AIC and FPE tend to a high order, and BIC to the true one if it is a candidate.
 
     Raises InputError for misuse and experiments too short for the largest order.
     """
@@ -63,7 +63,7 @@ def arx_orders(
     shapes = ((p, p), (p, m), (p, m))
     largest = [np.full(s, v[-1], np.int64) for s, v in zip(shapes, lists, strict=True)]
     reach = max(lists[0][-1], lists[1][-1] + lists[2][-1] - 1)
-    # All delays from the smallest on, up to the last lag of the largest.
+    # One triangle with all lags serves every candidate.
     first = np.full((p, m), lists[2][0], np.int64)
     span = (largest[0], largest[1] + (lists[2][-1] - lists[2][0]), first)
     triangle = triangularized(data, *span, reach)

@@ -7,8 +7,8 @@ two filters for each pair: with w = q^-l u / F and s = q^-l (B / F u) / F,
     d y / d b_l = w,   d y / d f_l = -s.
 
 The start is the best of an ARX model and of Steiglitz and McBride's iteration, which refits that
-model to data filtered by the last 1 / F; the search is a trust-region one that turns back
-wherever F has a root outside the unit circle.
+model to data filtered by the last 1 / F. The trust-region search rejects steps that move a root of F
+outside the unit circle.
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ from axisight.records.experiment import Experiment
 from axisight.statistics.least_squares import inverse_root, scaled_solution
 
 START_ROUNDS = 20
-"""Refits of the start; it has settled or wanders by then."""
+"""Refits of the start; more do not improve it."""
 
 LONG_ORDERS = (30, 60)
-"""ARX orders that a start with several inputs is taken from too: noise on the output is not that
-of an ARX model, and only a long one comes near it."""
+"""Further ARX orders to start from if there are several inputs. Only a long ARX model comes near white
+noise on the output."""
 
 EXACT = 1e-12
-"""Singular values below this share are rounding."""
+"""Singular values below this share of the largest are rounding."""
 
 PULSE_SAMPLES = 4000
-"""Length of the pulse responses that a start with several inputs is taken from."""
+"""Samples of the pulse responses to start from if there are several inputs."""
 
 
 @summarized
@@ -61,10 +61,10 @@ class OutputErrorModel:
 
     ``b[i][j]`` and ``f[i][j]`` are the polynomials in q^-1 of output i and input j (from 0),
     delays included, f with leading one. ``names`` (``B12[1]``: output 1, input 2, lag 1),
-    ``values`` and ``covariance`` run over all parameters. ``noise_variance`` (n_out,) of e.
-    ``status``: ``converged``, ``max_evaluations`` or ``rank_deficient`` (the data do not
-    determine the parameters: standard errors are NaN), the worst of the outputs; ``warnings``
-    say what to do.
+    ``values`` and ``covariance`` run over all parameters. ``noise_variance`` (n_out,) is that of e.
+    ``status`` is that of the worst output: ``converged``, ``max_evaluations`` or ``rank_deficient``
+    (the data do not determine the parameters, and standard errors are NaN). ``warnings`` say what
+    to do.
     """
 
     sample_time_s: float
@@ -110,10 +110,11 @@ class OutputErrorModel:
     def response(
         self, frequency_hz: ArrayLike, *, input_unit: str = "Nm", output_unit: str = "rad"
     ) -> xr.Dataset:
-        """Return B / F at e^{iwT} with its variance, as `axisight.frf.frequency_response`.
+        """Return B / F at e^{iwT} and its variance, in the format of `axisight.frf.frequency_response`.
 
         ``frequency_hz`` [Hz] ascends, up to Nyquist; ``input_unit`` and ``output_unit`` are
-        labels. The variance follows from the covariance of the parameters to first order.
+        labels. The variance follows from the covariance of the parameters to first order. Raises
+        InputError for other frequencies.
         """
         hz = lines(frequency_hz, self.sample_time_s)
         z = np.exp(2j * np.pi * hz * self.sample_time_s)
@@ -168,7 +169,7 @@ class OutputErrorModel:
 
 @dataclass(frozen=True)
 class _Problem:
-    """One output: orders by input, its experiments, samples left out of each."""
+    """The problem of one output: orders by input, experiments, and samples left out of each."""
 
     nb: Integers
     nf: Integers
@@ -233,23 +234,25 @@ def output_error(
     """Return the output-error model of one or several experiments.
 
     experiments
-        `axisight.records.experiment.Experiment`, of one sample time and size. Each starts at
-        rest; take offsets off before.
+        `axisight.records.experiment.Experiment`, all with the same sample time and channels. Each
+        starts at rest; subtract offsets first.
     nf
         Order of F, one number or (n_out, n_in).
     nb, nk
         Number of coefficients of B and the lag of the first, one number or (n_out, n_in).
     skip
-        Samples at the start of each experiment that are not compared: where it was not at rest.
+        Samples at the start of each experiment that are not compared, for experiments that do not
+        start at rest.
     max_evaluations
-        Limit of the search, for each output.
+        Most evaluations of the search, for each output.
 
-    Standard errors hold for white measurement noise; a coloured one leaves the estimate
-    consistent in open loop and the standard errors wrong (`axisight.blackbox.residual_tests`). In closed
+    Standard errors hold for white measurement noise. With coloured noise in open loop the estimate
+    stays consistent, but the standard errors are wrong (`axisight.blackbox.residual_tests`). In closed
     loop output-error models are biased unless the noise is white or small.
 
-    Raises InputError for misuse; non-convergence is a status. An integrating or unstable
-    plant has no output-error model: fit its velocity, or give it ``arx`` or ``state_space``.
+    Raises InputError for misuse, for experiments that are too short, and for outputs without a stable
+    model to start from; non-convergence is a status. An integrating or unstable plant has no
+    output-error model: fit its velocity, or use ``arx`` or ``state_space``.
     """
     data = gathered(experiments, "experiments")
     p, m = data[0].output.shape[1], data[0].input.shape[1]
@@ -298,7 +301,7 @@ def _searched(problem: _Problem, limit: int, output: int) -> tuple[Real, str, in
 
 
 def _start(problem: _Problem, output: int) -> Real:
-    """Return the stable start of least loss: by refits, with several inputs by pulse responses."""
+    """Return the stable start of least loss: from refits, or from pulse responses for several inputs."""
     candidates = []
     if problem.n_inputs == 1:
         candidates.append([_refitted(problem)])
@@ -324,7 +327,7 @@ def _start(problem: _Problem, output: int) -> Real:
 
 
 def _refitted(problem: _Problem) -> Real | None:
-    """Return the best of ARX and of its refits to filtered data, for one input."""
+    """Return the best of an ARX model and its refits to filtered data, for one input."""
     best: tuple[float, Real] | None = None
     bottom = np.ones(1)
     for _ in range(START_ROUNDS):
@@ -360,7 +363,7 @@ def _equation_error(problem: _Problem, inputs: list[Real], outputs: list[Real]) 
 
 
 def _least_squares(matrix: Real, target: Real) -> Real:
-    # The triangle first: its singular values are those of the tall matrix, at a tenth of the cost.
+    # The triangle has the singular values of the tall matrix, at a tenth of the cost.
     (r,) = linalg.qr(np.column_stack([matrix, target]), mode="r", check_finite=False)
     width = matrix.shape[1]
     triangle = np.asarray(r[: width + 1], np.float64)
@@ -368,7 +371,7 @@ def _least_squares(matrix: Real, target: Real) -> Real:
 
 
 def _pulses(problem: _Problem, order: int) -> list[_Problem]:
-    """Return a problem for each input: the pulse response of an ARX model of some order."""
+    """Return one problem per input, whose data are the pulse response of an ARX model of ``order``."""
     reach = int((problem.nk + problem.nb).max()) + order
     rows = []
     for u, y in zip(problem.inputs, problem.outputs, strict=True):
@@ -395,7 +398,7 @@ def _pulses(problem: _Problem, order: int) -> list[_Problem]:
 
 
 def _stabilized(polynomial: Real) -> Real:
-    """Return the polynomial with roots beyond 0.999 reflected and drawn in."""
+    """Return the polynomial with its roots beyond 0.999 reflected to within 0.999."""
     roots = np.roots(polynomial)
     size = np.abs(roots)
     far = size > 0.999

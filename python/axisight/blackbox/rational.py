@@ -1,10 +1,10 @@
-"""Rational models of frequency responses with several inputs and outputs, common poles.
+"""Rational models, with common poles, of frequency responses with several inputs and outputs.
 
     G(x) = sum_k R_k / (x - p_k) + I_1 / x + I_2 / x^2 + D
 
-Vector fitting finds the poles, a search on them alone, the residues solved for at every step
-(variable projection), takes them on to the weighted least-squares optimum: the maximum of the
-likelihood where the variance of the response is known.
+Vector fitting finds first poles. A search over the poles alone, which solves for the residues at every
+step (variable projection), then finds the weighted least-squares optimum. That is the maximum of the
+likelihood if the variance of the response is known.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ from axisight.statistics.least_squares import inverse_root
 class RationalModel:
     """A rational model with its uncertainty.
 
-    ``poles`` (n,) without integrators, in rad/s (s) or, with ``sample_time_s``, in the z plane;
-    ``integrators`` of 1/s, or 1/(z - 1), in every element; ``direct`` (n_out, n_in), zero if not
-    fitted. ``status``: ``converged``, or ``not_converged`` (the best found is given); ``warnings``
-    say what to do. ``loss`` is the sum of squares of weighted residuals, real and imaginary
-    parts, of expectation ``degrees_of_freedom`` where the weights come from a known variance.
+    ``poles`` (n,) leave out integrators; they are in rad/s (s) or, with ``sample_time_s``, in the z
+    plane. ``integrators`` is the number of factors 1/s, or 1/(z - 1), in every element. ``direct``
+    (n_out, n_in) is zero if not fitted. ``status`` is ``converged``, or ``not_converged`` for the best
+    model found until then; ``warnings`` say what to do. ``loss`` is the sum of squares of the real and
+    imaginary parts of weighted residuals. Its expectation is ``degrees_of_freedom`` if the weights
+    come from a known variance.
     """
 
     poles: Complex
@@ -60,9 +61,9 @@ class RationalModel:
     problem: Weighted = field(repr=False)
     used: UsableLines = field(repr=False)
     pole_covariance: Real = field(repr=False)
-    """Of the coefficients of the sections."""
+    """Covariance of the coefficients of the sections."""
     units: tuple[str, str] = field(repr=False)
-    """Of input and output."""
+    """Units of input and output."""
 
     @property
     def order(self) -> int:
@@ -71,12 +72,12 @@ class RationalModel:
 
     @property
     def weighting(self) -> Weighting:
-        """By what the lines were weighed."""
+        """The weighting of the lines, as in `fit_rational`."""
         return self.used.weighting
 
     @property
     def variance_freedom(self) -> float | None:
-        """Complex degrees of freedom of a variance that is estimated, else None."""
+        """Complex degrees of freedom of an estimated variance, None for a known one."""
         return self.used.degrees_of_freedom
 
     @property
@@ -85,9 +86,9 @@ class RationalModel:
         return self.domain.stable(self.sections.poles())
 
     def zeros(self, output: int = 1, input_: int = 1) -> Complex:
-        """Return the zeros (n,) of element (``output``, ``input_``), from 1, as ``poles`` are given.
+        """Return the zeros (n,) of element (``output``, ``input_``), both from 1, in the units of ``poles``.
 
-        For models with a direct term and without integrators; raises InputError for others.
+        Works for models with a direct term and without integrators; raises InputError for others.
         """
         for name, value, most in (("output", output, self.n_out), ("input_", input_, self.n_in)):
             if whole(name, value, 1) > most:
@@ -104,7 +105,7 @@ class RationalModel:
         """Return the poles as modes, slowest first, with standard errors.
 
         Variables over ``mode``: ``pole``, ``eigenvalue_rad_s``, ``frequency_hz``, ``damping_ratio``,
-        ``frequency_std_hz``, ``damping_std``; one of each complex pair.
+        ``frequency_std_hz``, ``damping_std``; a complex pair is one mode.
         """
         x = self.sections.poles()
         rate, by_x = self.domain.rate(x)
@@ -142,10 +143,10 @@ class RationalModel:
         return out
 
     def response(self, frequency_hz: ArrayLike) -> xr.Dataset:
-        """Return the model at the lines with its variance, as `axisight.frf.frequency_response`.
+        """Return the response and its variance, in the format of `axisight.frf.frequency_response`.
 
-        ``frequency_hz`` [Hz] ascends; at zero an integrator is infinite, so NaN. The variance
-        is that of poles and residues together, to first order.
+        ``frequency_hz`` [Hz] ascends. At 0 Hz a model with integrators is NaN. The variance comes from
+        poles and residues together, to first order. Raises InputError for other frequencies.
         """
         f = lines(frequency_hz, self.sample_time_s)
         x = self.domain.points(f)
@@ -164,24 +165,25 @@ class RationalModel:
         )
 
     def _chance(self, reduced: float) -> float:
-        """Probability of a larger reduced loss."""
+        """Return the probability of a larger reduced loss."""
         count, nu = self.degrees_of_freedom, self.variance_freedom
         if nu is None:
             return float(stats.chi2.sf(reduced * count, count))
         if self.used.neighbours:
             # Real and imaginary part of every element count.
             return float(stats.f.sf(reduced, count, 2 * nu * self.problem.values.size))
-        # By its own variance a squared residual is F(2, 2 nu), nu / (nu - 2) times more scattered.
+        # Over its own variance a squared residual is F(2, 2 nu), which scatters nu / (nu - 2) times more.
         if nu <= 2:
             return np.nan
         fewer = count * (nu - 2) / nu
         return float(stats.chi2.sf(reduced * fewer, fewer))
 
     def _variance(self, x: Complex, columns: Complex) -> Real:
-        """Variance of every element: of the residues at these poles, and of the poles.
+        """Return the variance of every element: from residues at fixed poles, plus from poles.
 
-        Rows Q r of an element: noise e makes residues r^-1 Q^T e, poles dp make them follow by
-        -r^-1 Q^T S dp with the slopes S. Both are hardly correlated, dp is orthogonal to Q.
+        With rows Q r of an element, noise e changes the residues by r^-1 Q^T e, and a change dp of the
+        poles changes them by -r^-1 Q^T S dp with the slopes S. Both parts are nearly uncorrelated,
+        because dp is orthogonal to Q.
         """
         solved = self.problem.residues(self.sections)
         slopes = _slopes(self.problem, self.sections, solved)
@@ -201,30 +203,30 @@ class RationalModel:
 
     @property
     def reduced_loss(self) -> float:
-        """Loss over what the variance makes it: one if the model holds."""
+        """Loss divided by its expectation from the variance: one if the model holds."""
         return self.loss / max(self.degrees_of_freedom * self.loss_scale, 1e-300)
 
     @property
     def loss_scale(self) -> float:
-        """What the variance makes the square of a weighted residual."""
+        """Expected square of a weighted residual, from the variance."""
         return float(self.problem.spread.mean()) * self.used.own.misfit
 
     @property
     def noise_scale(self) -> float:
-        """Factor on the standard deviations of weighted residuals: one with a variance given."""
+        """Factor on the standard deviations of weighted residuals, one for a known variance."""
         if self.weighting == "variance":
             return float(np.sqrt(self.used.own.variance))
         return float(np.sqrt(self.loss / max(self.degrees_of_freedom, 1)))
 
     def residual_tests(self, lags: int = 10) -> xr.Dataset:
-        """Return whether the residuals are what the variance says, and white over the lines.
+        """Return tests whether the residuals have the given variance and are white over the lines.
 
-        Attributes: ``reduced_loss`` (loss over what the variance makes it, one if all is well) and
-        ``loss_p``, the probability of so large a loss by chance (NaN without a variance), by the
-        F distribution where the variance itself is estimated.
-        Over (output, input): ``whiteness_p``, of so much correlation between lines up to ``lags``
-        apart; ``largest``, the largest residual in standard deviations. Raises InputError for
-        fewer than four times ``lags`` lines.
+        Attributes: ``reduced_loss`` is the loss divided by its expectation from the variance, one if
+        the model holds. ``loss_p`` is the probability of so large a loss by chance, NaN without a
+        variance; it uses the F distribution if the variance itself is estimated.
+        Over (output, input): ``whiteness_p`` is the probability of so much correlation between lines
+        up to ``lags`` apart, and ``largest`` the largest residual in standard deviations. Raises
+        InputError for fewer than four times ``lags`` lines.
         """
         most = whole("lags", lags, 1)
         n = len(self.problem.x)
@@ -268,38 +270,40 @@ def fit_rational(
     start_rad_s: ArrayLike | None = None,
     max_iterations: int = 60,
 ) -> RationalModel:
-    """Return a rational model with common poles of a frequency response.
+    """Return the rational model with common poles that fits a frequency response.
 
     response
-        Dataset of `axisight.frf.frequency_response`; lines that are NaN, or have no finite variance
-        where that weighs, are left out.
+        Dataset of `axisight.frf.frequency_response`. Lines that are NaN are left out, as are lines
+        without finite variance if ``weighting`` is ``"variance"``.
     order
         Number of poles besides the integrators.
     sample_time_s
-        Fit in z at e^{iwT}, the response of a sampled loop with held input; without it in s.
+        Sample time T [s]: fit in z at e^{iwT}, the response of a sampled loop with held input. None:
+        fit in s.
     integrators
-        Poles at s = 0 or z = 1 of every element: 0, 1, or 2 (torque to angle, friction out of
-        sight).
+        Poles at s = 0 or z = 1 of every element: 0, 1, or 2 (from torque to angle, if friction is
+        not visible).
     direct
         Whether there is a constant term; without it the model is strictly proper.
     weighting
-        ``"variance"``: by the standard deviation of the response, which makes the loss a
-        chi-square; ``"relative"``: by one over its magnitude; ``"absolute"``: none. With the
-        last two the noise is estimated from the residuals.
+        ``"variance"``: by one over the standard deviation of the response, which makes the loss a
+        chi-square; ``"relative"``: by one over the magnitude; ``"absolute"``: all lines alike. With
+        the last two the noise is estimated from the residuals.
     neighbours
-        How many neighbouring lines say by which variance a line is weighed: a weight from a
-        variance that is too small by chance rules the fit. None: none where the variance is
-        known (no ``degrees_of_freedom``) or rests on 30, else as many as make 30 together, an
-        even number from 4; 0: each line by its own, and uncertainties are enlarged by what such
-        weights cost. Pooled, they come from the variance as given.
+        Number of neighbouring lines whose variances are pooled for the weight of a line. Pooling
+        keeps a line whose variance is too small by chance from dominating the fit. None: no pooling
+        if the variance is known (no ``degrees_of_freedom``) or has at least 30 degrees of freedom;
+        otherwise enough lines for 30 together, an even number from 4. 0: each line by its own
+        variance, with uncertainties enlarged by the cost of such weights. With pooled weights,
+        uncertainties come from the variance as given.
     stable
-        Keep the poles stable: mirrored while vector fitting, never left in the search. The
-        integrators stay.
+        Whether to keep the poles stable: vector fitting mirrors unstable poles, and the search does
+        not leave the stable region. Integrators stay.
     start_rad_s
-        Poles to start from, closed under conjugation [rad/s]; by default pairs of 1 %
-        damping spread over the band, linearly and logarithmically, the better kept.
+        Poles to start from, closed under conjugation [rad/s]. By default pairs of 1 % damping, spread
+        over the band linearly or logarithmically, whichever fits better.
     max_iterations
-        Of vector fitting, and evaluations of the search.
+        Most iterations of vector fitting, and most evaluations of the search.
 
     Non-convergence is a status. Raises InputError for misuse, for a variance that is missing, and
     for fewer lines than unknowns.
@@ -338,7 +342,7 @@ def fit_rational(
         sections, evaluations, settled = _searched(problem, first, domain, stable, limit)
         steps += evaluations
         for _ in range(RENEWALS if used.neighbours else 0):
-            # Neighbours' variances relative to the model, not to a magnitude with its error.
+            # Variances are pooled relative to the model, because the measured magnitude has errors.
             columns = problem.columns(sections)
             modelled = np.abs(columns @ problem.residues(sections).numerators.T)
             problem = _weighed(used, x, extra, modelled.reshape(used.values.shape))
@@ -348,7 +352,7 @@ def fit_rational(
 
 
 RENEWALS = 2
-"""How often weights from neighbours are renewed with the magnitude of the model."""
+"""How often pooled weights are computed again from the magnitude of the model."""
 
 
 def _weighed(used: UsableLines, x: Complex, extra: Complex, magnitude: Real) -> Weighted:
@@ -420,9 +424,9 @@ def _searched(
 
 
 def projected_jacobian(problem: Weighted, sections: Sections, solved: Solved) -> Real:
-    """Return the derivative of the residuals by the sections, residues solved for (Kaufman).
+    """Return the derivative of the residuals by the sections, with residues eliminated (Kaufman).
 
-    Its normal matrix at the optimum is the Fisher information of the poles, residues free.
+    Its normal matrix at the optimum is the Fisher information of the poles for free residues.
     """
     slopes = _slopes(problem, sections, solved)
     left = slopes - solved.q @ (np.swapaxes(solved.q, 1, 2) @ slopes)
@@ -488,7 +492,7 @@ def _packed(
 
 
 def _doubts(model: RationalModel) -> list[str]:
-    """Return what speaks against standard errors from the variance of the response."""
+    """Return reasons to doubt standard errors that come from the variance of the response."""
     out = []
     if model.weighting == "variance" and model.reduced_loss > MISFIT_EXPLAINED:
         out.append(
@@ -504,7 +508,7 @@ def _doubts(model: RationalModel) -> list[str]:
 
 
 def _covariance(problem: Weighted, sections: Sections, scale: float) -> tuple[Real, list[str]]:
-    """Return the covariance of the sections by the spread of weighted residuals."""
+    """Return the covariance of the sections and warnings, from the spread of weighted residuals."""
     if sections.order == 0:
         return np.zeros((0, 0)), []
     jacobian = projected_jacobian(problem, sections, problem.residues(sections))
@@ -522,17 +526,17 @@ def _quadratic(rows: Complex, matrix: Real) -> Real:
 
 
 def rational_orders(response: xr.Dataset, orders: Iterable[int], **options: object) -> xr.Dataset:
-    """Return the losses of several orders of `fit_rational`, and which one to choose.
+    """Return the losses of `fit_rational` for several orders, and the best orders.
 
-    response
-        As there; so are the ``options``.
+    response, options
+        Arguments of `fit_rational`.
     orders
         Numbers of poles.
 
-    Variables over ``order``: ``loss``, ``reduced_loss``, ``n_parameters``, ``aic`` and ``bic`` (of
-    the likelihood; with a variance that is not known, of the residual power), ``status``
-    (``failed`` where the lines are too few), ``stable``.
-    ``attrs["best_bic"]`` and ``attrs["best_aic"]`` are orders, -1 where all failed.
+    Variables over ``order``: ``loss``, ``reduced_loss``, ``n_parameters``, ``aic``, ``bic``,
+    ``status`` (``failed`` if the lines are too few) and ``stable``. The criteria use the likelihood,
+    or the residual power if the variance is not known. ``attrs["best_bic"]`` and
+    ``attrs["best_aic"]`` are orders. Raises InputError without orders, and if every order fails.
     """
     wanted = sorted({whole("orders", n, 0) for n in orders})
     if not wanted:

@@ -1,10 +1,10 @@
-"""State-space realizations of rational models, of the least order their residues allow.
+"""State-space realizations of rational models, of the least order that their residues allow.
 
-The residue of a pole, a matrix R_k, takes rank(R_k) states and a complex pair twice as many; the
+A pole with residue R_k, a matrix, takes rank(R_k) states, and a complex pair twice as many. The
 integrators I_1 / x + I_2 / x^2 take the rank of the Hankel matrix [[I_1, I_2], [I_2, 0]] (Ho and
-Kalman). Mechanical modes have residues of rank one: with `rank=1` each keeps one direction in
-and one out, and inputs and outputs are then fitted again in turn, poles fixed, until the loss
-settles.
+Kalman). Mechanical modes have residues of rank one: with `rank=1` each mode keeps one input and one
+output direction. Input and output matrices are then fitted again in turn, with fixed poles, until
+the loss settles.
 """
 
 from __future__ import annotations
@@ -27,16 +27,19 @@ from axisight.frf.response import frequency_response
 from axisight.statistics.least_squares import scaled_solution
 
 ROUNDS = 50
-"""Of fitting inputs and outputs in turn."""
+"""Most rounds of fitting inputs and outputs in turn."""
 
 
 @summarized
 @dataclass(frozen=True)
 class Realization:
-    """x' = A x + B u, or x(t+T) = A x + B u with ``sample_time_s``; y = C x + D u.
+    """A state-space realization of a rational model.
 
-    ``loss`` is the weighted one of the rational fit, for this realization; ``status`` is
-    ``exact`` (all of the rational model kept), ``converged`` or ``not_converged`` (rank cut, refitted).
+        x' = A x + B u,   or x(t+T) = A x + B u with ``sample_time_s``;   y = C x + D u
+
+    ``loss`` is the weighted loss of the rational fit, computed for this realization. ``status`` is
+    ``exact`` if the realization keeps all of the rational model. If the rank was cut and the model
+    fitted again, it is ``converged`` or ``not_converged``.
     """
 
     a: Real
@@ -60,9 +63,10 @@ class Realization:
     def response(
         self, frequency_hz: ArrayLike, *, input_unit: str = "Nm", output_unit: str = "rad"
     ) -> xr.Dataset:
-        """Return G at the lines, as `axisight.frf.frequency_response`, variance NaN.
+        """Return G in the format of `axisight.frf.frequency_response`, with variance NaN.
 
-        ``frequency_hz`` [Hz] ascends; ``input_unit`` and ``output_unit`` are labels.
+        ``frequency_hz`` [Hz] ascends; ``input_unit`` and ``output_unit`` are labels. Raises
+        InputError for other frequencies.
         """
         f = lines(frequency_hz, self.sample_time_s)
         s = 2j * np.pi * f
@@ -94,12 +98,13 @@ def realize(
     """Return a state-space realization of a rational ``model``.
 
     rank
-        Keep at most so many directions of each pole's residue (not of the integrators'), and
-        refit; None keeps those above ``rank_tolerance``.
+        Largest rank of each pole's residue, after which the model is fitted again; integrators are
+        not cut. None keeps all directions above ``rank_tolerance``.
     rank_tolerance
         Singular values of a residue below this share of its largest are dropped.
 
-    Raises InputError for misuse, and for real poles that coincide: their residues are infinite.
+    Raises InputError for misuse, and for real poles that coincide, because their residues are
+    infinite.
     """
     most = None if rank is None else whole("rank", rank, 1)
     if not 0 <= rank_tolerance < 1:
@@ -158,7 +163,7 @@ def _residues(model: RationalModel) -> list[tuple[complex, Complex]]:
 def _block(
     pole: complex, residue: Complex, most: int | None, tolerance: float
 ) -> tuple[Real, Real, Real, bool]:
-    """Return A, B, C of a pole, with its conjugate if it is complex, and whether rank was cut."""
+    """Return A, B, C of a pole (and its conjugate, if complex), and whether its rank was cut."""
     real = pole.imag == 0
     u, s, vh = np.linalg.svd(residue.real if real else residue)
     kept = max(int(np.sum(s > tolerance * s[0])), 1)
@@ -184,7 +189,7 @@ def _integrators(found: Real, tolerance: float) -> tuple[Real, Real, Real]:
         hankel, shifted = first, np.zeros((p, m))
     else:
         zero, second = np.zeros((p, m)), found[1]
-        # Poles near zero trade with I_1; rows and columns are brought to one size first.
+        # Poles near zero can take over part of I_1, so rows and columns are scaled to one size.
         hankel = np.block([[first, second], [second, zero]])
         shifted = np.block([[second, zero], [zero, zero]])
     u, s, vh = np.linalg.svd(hankel)

@@ -1,4 +1,4 @@
-"""Tests of what a model leaves: white, and not explained by the input, Wernholt (2004), 3.5."""
+"""Tests whether residuals are white and independent of the input, Wernholt (2004), 3.5."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from axisight.statistics.correlation import (
 )
 
 LEAST_SPREAD = 1e-6
-"""Share of the largest variance of cross-covariances below which a direction carries no test."""
+"""Directions of the cross-covariances below this share of the largest variance are not tested."""
 
 
 @summarized
 @dataclass(frozen=True)
 class ResidualTests:
-    """Results over outputs and inputs.
+    """Results of both residual tests, for every output and every pair of output and input.
 
     ``autocorrelation`` (n_out, lags + 1), one at lag 0, and ``cross_correlation``
     (n_out, n_in, 2 lags + 1), lags from -lags to lags, are normalized. ``whiteness_p`` (n_out,)
-    and ``independence_p`` (n_out, n_in) are the probabilities of so much correlation or more by
-    chance; below 1 - ``probability`` the test fails. The test of independence counts lags from
-    0 on; correlation at negative lags shows feedback. ``autocorrelation_bound`` and
-    ``cross_correlation_bound`` (n_out, n_in) hold a single lag with ``probability``.
+    and ``independence_p`` (n_out, n_in) are p-values: the probability of at least this much
+    correlation by chance. Below 1 - ``probability`` the test fails. The test of independence uses
+    lags from 0 on; correlation at negative lags shows feedback. With ``probability``, a single lag
+    stays within ``autocorrelation_bound`` and ``cross_correlation_bound`` (n_out, n_in).
     """
 
     autocorrelation: Real
@@ -56,7 +56,7 @@ class ResidualTests:
         return bool(np.all(self.independence_p >= 1 - self.probability))
 
     def advice(self) -> tuple[str, ...]:
-        """Return in words what fails and what it means."""
+        """Return one sentence for every test that fails: what it means and what to do."""
         out = []
         limit = 1 - self.probability
         for i in np.flatnonzero(self.whiteness_p < limit):
@@ -108,14 +108,14 @@ def residual_tests(
     lags
         Largest lag.
     probability
-        Of passing when the model is right.
+        Probability that a right model passes.
 
     Whiteness: Ljung and Box's sum of squared autocorrelations, chi-squared with ``lags``
     degrees of freedom (estimated parameters take a few off, which makes the test mild).
     Independence: the vector of cross-correlations at lags 0 to ``lags`` against its covariance
     sum_k R_e(k) R_u(k + i - j) / n, for a residual of any colour (Ljung, 1999, chapter 16).
 
-    Raises InputError for misuse, and a residual or input that is constant.
+    Raises InputError for misuse, and for a residual or input that is constant.
     """
     if not 0 < probability < 1:
         raise InputError(f"probability: expected a number between 0 and 1, got {probability}")

@@ -3,15 +3,16 @@
 Both methods use one triangular factor of past inputs and outputs z(t), future inputs and future
 outputs, over all experiments. A state is a linear map of the past, x(t) = M z(t).
 
-``moesp`` (Verhaegen, 1994, with past inputs and outputs as instruments): the future outputs less
-what the future inputs explain, projected on the past, span the observability matrix; A and C
-follow from its shift, B and D from linear least squares of the simulated output, the unknown start
-of each experiment taken off. Any colour of noise, open loop only: feedback biases it.
+``moesp`` (Verhaegen, 1994, with past inputs and outputs as instruments) subtracts from the future
+outputs what the future inputs explain, and projects the rest on the past. The result spans the
+observability matrix. A and C follow from its shift, B and D from linear least squares of the
+simulated output, with the unknown initial state of each experiment eliminated. It allows any colour
+of noise, but works in open loop only: feedback biases it.
 
-``pbsid`` (Chiuso, 2007): a long ARX model gives the predictor's Markov parameters; with them the
-map from the past to the predicted future is written down without future inputs, and its largest
-singular directions are the state. Then every matrix is a regression. Open and closed loop; exact
-as the window grows, its error is the power of the predictor's largest pole to the window.
+``pbsid`` (Chiuso, 2007) takes the predictor's Markov parameters from a long ARX model. They give the
+map from the past to the predicted future without future inputs, and its largest singular directions
+are the state. Every matrix then follows by regression. It works in open and closed loop. Its error
+vanishes as the window grows: it is the predictor's largest pole to the power of the window.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ CHUNK = 4096
 """Rows that are triangularized at a time."""
 
 STATE_NUMBERS = 1 << 22
-"""Numbers of simulated states that are kept at a time."""
+"""Simulated state values that are kept in memory at a time."""
 
 ROUNDING = 1e-9
 """Innovations below this share of the output are rounding, not noise."""
@@ -47,11 +48,11 @@ Method = Literal["pbsid", "moesp"]
 @summarized
 @dataclass(frozen=True)
 class SubspaceModel:
-    """A state-space model and the singular values its order was read from.
+    """A state-space model and the singular values that show its order.
 
-    Of the matrices no standard errors exist in closed form, and none are given; `response` has
-    a variance of NaN. ``singular_values``, largest first, fall off behind the order of the
-    system. ``warnings`` say what to mind.
+    The matrices have no standard errors, because none exist in closed form; the variance of
+    `response` is NaN. ``singular_values``, largest first, fall off after the order of the system.
+    ``warnings`` say what to check.
     """
 
     model: StateSpaceModel
@@ -74,7 +75,11 @@ class SubspaceModel:
     def response(
         self, frequency_hz: ArrayLike, *, input_unit: str = "Nm", output_unit: str = "rad"
     ) -> xr.Dataset:
-        """Return `StateSpaceModel.response`: ``frequency_hz``, ``input_unit``, ``output_unit``."""
+        """Return the response as `StateSpaceModel.response` does, with variance NaN.
+
+        ``frequency_hz`` [Hz] ascends, up to Nyquist; ``input_unit`` and ``output_unit`` are labels.
+        Raises InputError for other frequencies.
+        """
         return self.model.response(frequency_hz, input_unit=input_unit, output_unit=output_unit)
 
 
@@ -112,7 +117,7 @@ class _Past:
         return self.r[:, start : start + self.n_out]
 
     def shifted(self) -> Real:
-        """Columns of z(t + 1): the present, then all of z(t) but its oldest."""
+        """Columns of z(t + 1): (u, y) at t, then z(t) without its oldest sample."""
         kept = self.n_past - self.n_in - self.n_out
         return np.hstack([self.now_u, self.now_y, self.past[:, :kept]])
 
@@ -128,21 +133,21 @@ def state_space(
     """Return a state-space model of one or several experiments.
 
     experiments
-        `axisight.records.experiment.Experiment`, of one sample time and size. Take offsets
-        off before. They need not start at rest.
+        `axisight.records.experiment.Experiment`, all with the same sample time and channels.
+        Subtract offsets first. Experiments need not start at rest.
     order
         Number of states; see `axisight.blackbox.state_space_orders`.
     method
         ``"pbsid"`` (open and closed loop) or ``"moesp"`` (open loop).
     window
-        Samples of past and of future, by default twice the order and at least 10. The future must
-        show the order: ``window`` times outputs at least ``order`` + outputs.
+        Samples of past and of future, by default twice the order and at least 10. ``window`` times
+        the number of outputs must be at least ``order`` plus the number of outputs.
     direct
-        Whether the input acts within its sample (D). In closed loop it must not: D is then not
-        identifiable without a delay in the controller.
+        Whether the input acts within its sample (D). Leave it False in closed loop: D is not
+        identifiable there unless the controller has a delay.
 
-    An unstable result is returned as it is, with a warning. Raises InputError for misuse, for
-    experiments too short, and for input that does not excite the window.
+    An unstable model is returned with a warning. Raises InputError for misuse, for experiments that
+    are too short, and for input that does not excite the window.
     """
     data = gathered(experiments, "experiments")
     n = whole("order", order, 1)
@@ -160,13 +165,18 @@ def state_space_orders(
     window: int | None = None,
     direct: bool = False,
 ) -> xr.Dataset:
-    """Return singular values and, for each of ``orders``, what the model predicts.
+    """Return singular values and losses of prediction for each of ``orders``.
 
-    ``experiments``, ``method``, ``window`` and ``direct`` as in `state_space`, the window by default
-    that of the largest order. Variables over ``order``: ``singular_value`` (of that order),
-    ``loss`` (determinant of the covariance of the one-step errors on the data), and on
-    ``validation`` data ``validation_loss`` and ``simulation_fit`` (order, output) in per cent
-    (3.54), NaN without; ``stable``. ``attrs["best_validation_loss"]`` is the order of the smallest.
+    ``experiments``, ``method``, ``window`` and ``direct`` are those of `state_space`; the default
+    window is that of the largest order. Variables over ``order``:
+
+    - ``singular_value``: the one at that order
+    - ``loss``: determinant of the covariance of the one-step errors on the data
+    - ``validation_loss``: the same on ``validation`` data, NaN without
+    - ``simulation_fit`` (order, output): fit (3.54) on ``validation`` data [%], NaN without
+    - ``stable``
+
+    ``attrs["best_validation_loss"]`` is the order with the smallest validation loss.
 
     Raises InputError as `state_space` does.
     """
@@ -306,7 +316,7 @@ def _regressed(state: Real, following: Real, u: Real, y: Real, direct: bool) -> 
     c = output[:n].T
     d = output[n:].T if direct else np.zeros((y.shape[1], m))
     e = y - seen @ output
-    # With feedback u(t) follows e(t): both are regressed on together.
+    # With feedback u(t) depends on e(t), so one regression takes both.
     known = np.linalg.norm(e) > ROUNDING * np.linalg.norm(y)
     together = np.hstack([state, u, e]) if known else np.hstack([state, u])
     forward = _solve(together, following).T
@@ -316,7 +326,7 @@ def _regressed(state: Real, following: Real, u: Real, y: Real, direct: bool) -> 
 
 
 def _gain(e: Real, y: Real, left: Real) -> Real:
-    """Return K, what the state learns from the innovation; zero without noise."""
+    """Return the gain K from innovation to state, zero without noise."""
     if np.linalg.norm(e) <= ROUNDING * np.linalg.norm(y):
         return np.zeros((left.shape[1], e.shape[1]))
     return _solve(e, left).T
@@ -331,7 +341,7 @@ def _moesp(past: _Past, data: list[Experiment], n: int, direct: bool) -> tuple[R
     c = observability[:p]
     a = _solve(observability[:-p], observability[p:])
     b, d = _input_matrices(a, c, data, past, direct)
-    # The state as a map of the past, for the noise model: what the past tells of the future.
+    # The noise model needs the state as a map of the past.
     weight = _solve(past.r[first:second, first:second], between)
     map_ = weight @ np.linalg.pinv(observability).T
     state, following = past.past @ map_, past.shifted() @ map_
@@ -344,14 +354,14 @@ def _moesp(past: _Past, data: list[Experiment], n: int, direct: bool) -> tuple[R
 def _input_matrices(
     a: Real, c: Real, data: list[Experiment], past: _Past, direct: bool
 ) -> tuple[Real, Real]:
-    """Return B and D by least squares of the simulated output, each start eliminated."""
+    """Return B and D by least squares of the simulated output, with initial states eliminated."""
     n, m, p = len(a), past.n_in, past.n_out
     largest = float(np.max(np.abs(np.linalg.eigvals(a))))
     width = n * m + (p * m if direct else 0)
     factors = []
     for e in data:
         u, y = e.input / past.input_scale, e.output / past.output_scale
-        # An unstable A is simulated for as long as rounding allows.
+        # Rounding errors grow with an unstable A, so only its first samples are simulated.
         length = len(u)
         if largest > 1:
             length = int(min(length, max(4 * n, np.log(1e6) / np.log(largest))))
@@ -374,10 +384,11 @@ def _input_matrices(
 def _simulated_columns(
     a: Real, c: Real, u: Real, y: Real, start: Real, direct: bool
 ) -> tuple[Real, Real]:
-    """Return what each start, entry of B and entry of D makes of the output, then the output.
+    """Return the regressor of the simulated output, and the states after the last sample.
 
-    Rows are samples by outputs; ``start`` holds the state that each of the first two has made,
-    and is returned as it is after the last sample.
+    Columns are the outputs due to each unit initial state, each entry of B and, if ``direct``, each
+    entry of D; the last column is the measured output. Rows are samples by outputs. ``start`` holds
+    the states at the first sample, for initial states and entries of B.
     """
     n, m, p = len(a), u.shape[1], y.shape[1]
     drive = np.zeros((len(u), n, n + n * m))
@@ -394,7 +405,7 @@ def _simulated_columns(
 def _solve(matrix: Real, target: Real) -> Real:
     """Return the least-squares solution of least norm.
 
-    A past without noise is of low rank; that solution then predicts as well as any.
+    A past without noise has low rank; the solution of least norm then predicts as well as any other.
     """
     return np.asarray(np.linalg.lstsq(matrix, target, rcond=1e-12)[0])
 

@@ -1,6 +1,6 @@
-"""The withheld-effect benchmark: machines of other engines, diagnoses that cannot see the truth, a score.
+"""The withheld-effect benchmark: it simulates machines in other engines and scores blind diagnoses.
 
-`axisight.blind.make` needs MuJoCo and Pinocchio (extra ``blind``), the others nothing.
+Only `axisight.blind.make` needs MuJoCo and Pinocchio (extra ``blind``).
 """
 
 from axisight.blind.calibration import calibration_error

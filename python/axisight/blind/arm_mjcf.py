@@ -1,4 +1,4 @@
-"""An arm as a MuJoCo model, with what MuJoCo itself has to make a machine differ from its simulator."""
+"""An arm as a MuJoCo model, with those changes of a machine that MuJoCo simulates itself."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from axisight.blind.machine import NOTHING, Machine, Native
 from axisight.robot.description import Joint
 
 STEPS_PER_SAMPLE = 2
-"""Of the engine's integrator."""
+"""Integrator steps per sample."""
 
 
-# MuJoCo wants mass in every moving body; this much changes nothing visible.
+# MuJoCo refuses a moving body without mass; this mass is too small to show.
 _NEARLY_MASSLESS = '<inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/>'
 
 
 @dataclass
 class _Parts:
-    """Text of a model, part by part."""
+    """XML of a model, part by part."""
 
     bodies: str = ""
     close: str = ""
@@ -29,9 +29,9 @@ class _Parts:
 
 
 def mjcf(machine: Machine, step_s: float) -> str:
-    """Return the model (MJCF) of a machine: rotors on tendons that pull at their joints.
+    """Return the MuJoCo model (MJCF) of a machine: tendons join rotors and joints.
 
-    Positions are motor angles, then those of the base's springs, then joint angles.
+    Order of the positions: motor angles, springs of the base, joint angles. ``step_s`` is the step [s].
     """
     robot, ends = machine.robot, machine.ends
     parts = _Parts()
@@ -61,7 +61,7 @@ def _add_joint(parts: _Parts, joint: Joint, origin: tuple[float, ...], machine: 
         spring = f'stiffness="{joint.spring.stiffness!r}" damping="{joint.spring.damping!r}"'
     parts.bodies += f'<body pos="{_vector(origin)}">'
     change = machine.native.get(len(parts.axes), NOTHING) if joint.drive is not None else NOTHING
-    # A position counts from where the bodies stand as they are written.
+    # MuJoCo counts a joint's position from the pose of the written bodies; ``ref`` shifts that zero.
     kind = "slide" if joint.prismatic else "hinge"
     zero = f'ref="{-change.zero_rad!r}"' if change.zero_rad else ""
     parts.bodies += (
@@ -83,7 +83,7 @@ def _add_drive(parts: _Parts, joint: Joint, change: Native, along: Sequence[floa
     drive, spring, name = joint.drive, joint.spring, joint.name
     if drive is None or spring is None:
         raise ValueError(f"{name}: expected an elastic gear")
-    # Drives of earlier axes that turn this gear along.
+    # Drives of earlier axes whose rotation this gear feels too.
     others = [(other, by) for other, by in zip(parts.axes, along, strict=False) if by]
     turned = "".join(f'<joint joint="{other}_rotor" coef="{by!r}"/>' for other, by in others)
     parts.axes.append(name)

@@ -1,4 +1,4 @@
-"""How right causes are that were said with a probability, and whether that carries over to other engines."""
+"""Calibration of the named causes: whether a probability says how often a cause is right, on each engine."""
 
 from __future__ import annotations
 
@@ -15,34 +15,35 @@ from axisight.effects import effect_info
 Array = NDArray[np.float64]
 
 _BINS = 10
-# The engine on which a temperature is fitted, to be judged on the others.
+# The temperature is fitted on this engine and judged on the others.
 _FITTED_ON = "mujoco"
-# Verdicts state probabilities to so much: none is surer.
+# Verdicts round probabilities to this: no cause is closer to 0 or 1.
 _SUREST = 1e-3
-# Factors on log-odds that are looked at.
+# Range of the temperature.
 _COLDEST, _HOTTEST = 0.2, 5.0
-# Causes, below which nothing is fitted.
+# Fewer causes than this are too few for a fit.
 _FEW = 20
-# What a family's prior may be off by, in log-odds: its standard deviation, and the largest looked at.
+# Prior of a family, in log-odds: standard deviation and bound.
 _PRIOR, _LARGEST = 1.0, 5.0
 
 
 def calibration_bins(judged: Sequence[Judged]) -> list[dict[str, float]]:
-    """Return by probability said: causes named (``count``), mean said and share right; empty bins left out."""
+    """Return per bin of probability the named causes (``count``), mean probability and share right."""
     return _bins(*_said(judged))
 
 
 def calibration_error(judged: Sequence[Judged]) -> float:
-    """Return the expected calibration error of the causes named (Naeini 2015), ten bins; NaN without."""
+    """Return the expected calibration error of named causes (Naeini 2015), ten bins; NaN without causes."""
     return _error(*_said(judged))
 
 
 def carried_over(judged: Sequence[Judged]) -> dict[str, Any] | None:
-    """Return a temperature and priors by family fitted on one engine, and what they do on the others.
+    """Return a temperature and priors by family, fitted on one engine, and their losses on the others.
 
-    Log-odds are divided by the temperature (Guo et al. 2017); one that is above 1 says that causes were named
-    too surely. A prior is what log-odds of a family's causes are off by after that, normal with a standard
-    deviation of 1. Losses are mean logarithmic ones [nat]. None where an engine has too few causes.
+    The temperature divides log-odds (Guo et al. 2017); above 1 it says that verdicts were overconfident. The
+    prior of a family is the remaining error of its log-odds, normal with a standard deviation of 1. Losses
+    are mean logarithmic losses [nat]. None if the fitted engine has too few causes or no other engine has
+    cases.
     """
     fitted_on = [j for j in judged if j.setting["engine"] == _FITTED_ON]
     own, right = _said(fitted_on)
@@ -70,7 +71,7 @@ def carried_over(judged: Sequence[Judged]) -> dict[str, Any] | None:
 
 
 def _prior(said: Array, right: Array, temperature: float) -> float:
-    """Return what log-odds of causes are off by after a temperature."""
+    """Return the error of log-odds that remains after a temperature."""
 
     def loss(prior: float) -> float:
         return (
@@ -102,7 +103,7 @@ def _judged_with(
 
 
 def _said(judged: Sequence[Judged]) -> tuple[Array, Array]:
-    """Return of all causes named what probability was said, and whether they are true (1 or 0)."""
+    """Return the stated probability of every named cause, and whether the cause is true (1 or 0)."""
     pairs = [
         (p, float(label in j.truth))
         for j in judged
@@ -113,7 +114,7 @@ def _said(judged: Sequence[Judged]) -> tuple[Array, Array]:
 
 
 def _families(judged: Sequence[Judged]) -> NDArray[np.str_]:
-    """Return the family of every cause named, as `_said` has them."""
+    """Return the family of every named cause, in the order of `_said`."""
     effects = [label.split("@")[0] for j in judged for label in j.named]
     return np.array([effect_info(name).family for name in effects], dtype=np.str_)
 

@@ -1,4 +1,4 @@
-"""Simulated cases as folders: logs, the preset as their simulator, the list of both."""
+"""Simulated cases as folders: logs, the preset as simulator, and the case file that lists both."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 class CaseFolder:
-    """A case that is written log by log; `finish` makes it one."""
+    """A case that is written log by log; `finish` completes it."""
 
     def __init__(self, folder: Path, name: str) -> None:
         self.folder = folder
@@ -30,9 +30,9 @@ class CaseFolder:
         torque: Array,
         angle: Array,
     ) -> None:
-        """Write a log: time (n,), velocity reference [rad/s], torque [Nm], angle [rad], (n, n_axes).
+        """Write a log: time (n,) [s]; velocity reference [rad/s], torque [Nm], angle [rad], each (n, n_axes).
 
-        Without a reference where there is none.
+        ``reference`` is None for a log without references.
         """
         data = {"time_s": time_s}
         for i in range(torque.shape[1]):

@@ -1,4 +1,4 @@
-"""The controller of a machine: velocity PI with what a machine may have other than its simulator."""
+"""The controller of a machine: velocity PI, with the changes that the machine has and its simulator lacks."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ Array = NDArray[np.float64]
 
 
 class Controller:
-    """Velocity PI; arrays end in an axis of motors, and may have one of runs before it.
+    """Velocity PI; the last dimension of its arrays is the motor, an earlier one may be the run.
 
-    ``angle``: measured motor angles [rad] where it begins, at rest; ``holding``: torques [Nm] it holds then.
+    ``angle``: measured motor angles [rad] at the start, at rest. ``holding``: torques [Nm] that hold the arm
+    there. Raises InputError for a robot with another controller.
     """
 
     def __init__(self, machine: Machine, angle: Array, holding: Array) -> None:
@@ -25,14 +26,14 @@ class Controller:
         self.kp = robot.controller_gains["kp"] * (1 + np.array([x.kp for x in own]))
         self.ki = robot.controller_gains["ki"] * (1 + np.array([x.ki for x in own]))
         lags = np.array([x.filter_s for x in own])
-        # Of a first-order lag between samples, exactly; all of a new speed without.
+        # Exact discretization of a first-order lag; 1 without a lag.
         self.fresh = -np.expm1(-self.sample_s / np.maximum(lags, 1e-12))
         self.for_rate = np.array([x.for_rate for x in own])
         self.for_speed = np.array([x.for_speed for x in own])
         self.speed = np.zeros_like(angle)
         self.wanted = np.zeros_like(angle)
         self.measured = angle.copy()
-        # Angle by which the motors are behind their reference: at rest it holds the arm.
+        # Integral of the speed error [rad]; at rest its torque holds the arm.
         self.behind = holding / self.ki
 
     def command(self, measured: Array, wanted: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Draws of a benchmark: which engine, arm, motions, effects; a function of (seed, number)."""
+"""Random cases of a benchmark: engine, arm, motions and effects, as a function of (seed, number)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from axisight.robot import Robot, load_robot
 
 Array = NDArray[np.float64]
 
-# Production scatter, relative, evenly within.
+# Production scatter: half width of a uniform distribution, relative.
 _SCATTER = {
     "mass": 0.02,
     "inertia_scale": 0.02,
@@ -27,14 +27,14 @@ _SCATTER = {
     "viscous_friction": 0.03,
     "damping": 0.08,
 }
-# What a native change is a share of.
+# Native changes, and the quantity of which each is a share.
 _CHANGES = (
     ("spring", "stiffness"),
     ("damper", "damping"),
     ("armature", "motor_inertia"),
     ("viscous", "viscous_friction"),
 )
-# Of so many cases one has nothing withheld, and one a pair.
+# One case of so many has no effect, one has two.
 _ONE_IN = {"nothing": 8, "pair": 6}
 ENGINES: Mapping[str, Mapping[str, Kind]] = {"mujoco": KINDS, "pinocchio": KINDS_BY_FORMULA}
 """Kinds of effects by engine."""
@@ -42,11 +42,11 @@ ENGINES: Mapping[str, Mapping[str, Kind]] = {"mujoco": KINDS, "pinocchio": KINDS
 _ENGINES = {"mujoco": 0.5, "pinocchio": 0.5}
 _ARMS = {"irb6600_like": 0.6, "scara_like": 0.15, "lever_like": 0.15, "cobot_like": 0.1}
 _MOTIONS = {"multisines": 0.6, "moves": 0.2, "slow_and_short": 0.2}
-# Of so many cases one has sensors with noise of first order, of a corner between these.
+# One case of so many has first-order sensor noise with a corner between these frequencies.
 _COLOURED_ONE_IN = 5
 _CORNER_HZ = (300.0, 800.0)
-# One has logs without references, unless its effect shows by them only or is in the logged torque; and one
-# torques in steps, of a converter of so many bits over twice the largest torque.
+# One case of so many has logs without references, unless only references show its effect or the logged torque
+# contains it. One has quantized torques: converter bits over twice the largest torque.
 _UNREFERENCED_ONE_IN = 8
 _STEPPED_ONE_IN = 8
 _BITS = (12, 16)
@@ -54,14 +54,17 @@ _BITS = (12, 16)
 
 @dataclass(frozen=True)
 class Choice:
-    """What is not drawn by chance: names of an engine, an arm and motions; None is drawn."""
+    """Fixed parts of a draw: engine, arm and motions by name; None is drawn.
+
+    Raises InputError for unknown names.
+    """
 
     engine: str | None = None
     arm: str | None = None
     motions: str | None = None
 
     def __post_init__(self) -> None:
-        """Refuse names that nothing has."""
+        """Raise InputError for unknown names."""
         for name, known in (("engine", _ENGINES), ("arm", _ARMS), ("motions", _MOTIONS)):
             value = getattr(self, name)
             if value is not None and value not in known:
@@ -70,11 +73,13 @@ class Choice:
 
 @dataclass(frozen=True)
 class Draw:
-    """One case as drawn: effects, a machine with and a ``bare`` one without, references by name and role.
+    """One case as drawn: effects, the machine with them, a ``bare`` machine without them, references.
 
-    ``robot``: the simulator that the case gets; ``corner_hz``: of the noise of its sensors, None where
-    it is white; ``referenced``: whether logs have references; ``bits`` of the torques, None where they have
-    no steps.
+    - ``robot``: the simulator of the case.
+    - ``references``: role and velocity reference (n, n_axes) [rad/s] by log name.
+    - ``corner_hz``: corner of the sensor noise, None for white noise.
+    - ``referenced``: whether the logs have references.
+    - ``bits``: resolution of the logged torques, None for torques without steps.
     """
 
     number: int
@@ -92,11 +97,11 @@ class Draw:
 
 
 DRAWN = Choice()
-"""All by chance."""
+"""Everything drawn."""
 
 
 def draw(seed: int, number: int, choice: Choice = DRAWN, attempt: int = 0) -> Draw:
-    """Return case ``number`` of a benchmark; another one at every further ``attempt``."""
+    """Return case ``number`` of a benchmark; every ``attempt`` draws another one."""
     rng = _chance(seed, number, attempt)
     engine, arm, motions = _circumstances(rng, choice)
     robot = load_robot(arm)
@@ -127,7 +132,7 @@ def draw(seed: int, number: int, choice: Choice = DRAWN, attempt: int = 0) -> Dr
 
 
 def circumstances(seed: int, number: int, choice: Choice = DRAWN) -> tuple[str, str, str]:
-    """Return the engine, the arm and the motions of case ``number``, as its first attempt has them."""
+    """Return engine, arm and motions of case ``number``, as drawn by its first attempt."""
     return _circumstances(_chance(seed, number, 0), choice)
 
 
@@ -160,7 +165,7 @@ def _effects(
 def _second(
     rng: np.random.Generator, scene: Scene, kinds: Mapping[str, Kind], first: str, taken: Drawn
 ) -> list[Drawn]:
-    """Return another effect of the library, elsewhere; none where there is no room for one."""
+    """Return another effect of the library on another axis; none if no axis is free."""
     rooms = {
         name: [axis for axis in kind.axes(scene) if axis != taken.axis]
         for name, kind in kinds.items()
@@ -175,7 +180,7 @@ def _second(
 
 
 def scattered(rng: np.random.Generator, robot: Robot) -> Robot:
-    """Return a machine of the robot's type, without effects: the same but for production scatter."""
+    """Return the robot with production scatter and without effects."""
     changed = {
         name: value * (1 + _SCATTER[quantity] * float(rng.uniform(-1, 1)))
         for name, value in robot.parameters().items()
@@ -185,7 +190,7 @@ def scattered(rng: np.random.Generator, robot: Robot) -> Robot:
 
 
 def _without_scatter_of(effects: Sequence[Drawn], machine: Robot, robot: Robot) -> Robot:
-    """Return the machine with what effects change as in the robot: they state the whole change."""
+    """Return the machine with nominal values of what the effects change, which state the whole change."""
     stated: dict[str, float] = {}
     for effect in effects:
         if effect.axis is not None:
@@ -198,7 +203,7 @@ def _without_scatter_of(effects: Sequence[Drawn], machine: Robot, robot: Robot) 
 
 
 def machine_of(robot: Robot, effects: Sequence[Drawn]) -> Machine:
-    """Return a robot with effects."""
+    """Return the machine that has a robot's parameters and these effects."""
     out = Machine(robot)
     for effect in effects:
         if effect.axis is None:

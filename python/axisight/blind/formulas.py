@@ -1,11 +1,11 @@
 """Formulas that a machine follows in the engine on Pinocchio.
 
-Friction, springs, gears and resolvers follow other formulas than those of `laws`; an offset, a limit, a
-report, a delay have only one.
+Friction, springs, gears and resolvers follow other formulas than in `laws`. Offsets, limits, reports and
+delays have only one formula.
 
-A formula acts on one axis of many runs at once. It answers with torques on the motors and on the
-joints, at any moment of a step, as a function of where the axis is and of where it was when the step
-began; `moved` ends a step. It may bend what sensors say and what drives do with commands.
+A formula acts on one axis of many runs at once. It returns the torques on motor and joint at any moment of a
+step, from the state of the axis and its state at the start of the step. `moved` ends a step. A formula may
+also change sensor readings and what drives make of commands.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Place:
-    """Where an axis is in every run (n_runs,), as `laws.Axis`; time [s] is one for all."""
+    """State of an axis in every run, arrays (n_runs,) in the units of `laws.Axis`; one time [s] for all."""
 
     time_s: float
     motor: Array
@@ -31,9 +31,9 @@ class Place:
     deflection_rate: Array
     gear_ratio: float
     stiffness: float
-    """Of the gear, on the joint [Nm/rad]."""
+    """Gear stiffness, joint side [Nm/rad]."""
     damping: float
-    """Of the gear [Nm s/rad]."""
+    """Gear damping, joint side [Nm s/rad]."""
 
     @property
     def joint(self) -> Array:
@@ -42,20 +42,20 @@ class Place:
 
     @property
     def joint_speed(self) -> Array:
-        """Of the joint [rad/s]."""
+        """Speed of the joint [rad/s]."""
         return np.asarray(self.gear_ratio * self.motor_speed - self.deflection_rate)
 
     @property
     def gear_torque(self) -> Array:
-        """Of spring and damper, on the joint [Nm]."""
+        """Torque of spring and damper on the joint [Nm]."""
         return np.asarray(self.stiffness * self.deflection + self.damping * self.deflection_rate)
 
 
 class Formula:
-    """A formula that does nothing: the base of all others."""
+    """A formula that does nothing: the base class."""
 
     def begin(self, place: Place, step_s: float) -> None:
-        """Begin at rest; steps will be this long."""
+        """Start at rest, with steps of ``step_s`` [s]."""
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
         """Return the torque on the motor and on the joint [Nm]."""
@@ -63,45 +63,45 @@ class Formula:
         return 0.0, 0.0
 
     def moved(self, at: Place) -> None:
-        """End a step."""
+        """End a step: keep what the next one needs."""
 
     def sensor(self, motor: Array) -> Array | float:
-        """Return what the sensor says more than the motor angle [rad], once a sample."""
+        """Return the error of the motor sensor [rad]; called once a sample."""
         del motor
         return 0.0
 
     def joint_sensor(self, joint: Array) -> Array | float:
-        """Return what the sensor says more than the joint angle, if it sits there, once a sample [rad]."""
+        """Return the error of a sensor on the joint [rad]; called once a sample."""
         del joint
         return 0.0
 
     def read(self, angle: Array) -> Array:
-        """Return the angle as it is read, noise included [rad]."""
+        """Return the reading of an angle that includes noise [rad]."""
         return angle
 
     def command(self, torque: Array) -> Array:
-        """Return the mean torque the drive makes of a command [Nm] over a step."""
+        """Return the mean torque [Nm] over a step that the drive makes of a command [Nm]."""
         return torque
 
     def reported(self, torque: Array) -> Array:
-        """Return the command as the drive reports it [Nm]."""
+        """Return the reported torque [Nm] of a command [Nm]."""
         return torque
 
 
 def _through_gear(at: Place, torque: Array) -> tuple[Array, Array]:
-    """Return what a torque of the gear is on the motor and on the joint."""
+    """Return the torques on motor and joint [Nm] of a gear torque."""
     return -at.gear_ratio * torque, torque
 
 
 def _bristle(torque: Array, moved: Array, limit: Array | float, stiffness: float) -> Array:
-    """Return Dahl's friction after a displacement one way, from what it was before (Dahl 1968)."""
+    """Return Dahl's friction after a displacement in one direction, from that before it (Dahl 1968)."""
     end = np.sign(moved) * limit
     return np.asarray(end + (torque - end) * np.exp(-stiffness * np.abs(moved) / limit))
 
 
 @dataclass
 class DahlFriction(Formula):
-    """Dry friction of the motor that comes with displacement, as the strain of a bristle does."""
+    """Dry friction of the motor that builds up with displacement, like the strain of a bristle (Dahl)."""
 
     dry_nm: float
     stiffness_nm_rad: float
@@ -126,7 +126,7 @@ class DahlFriction(Formula):
 
 @dataclass
 class OneSidedFriction(Formula):
-    """Dry friction that is larger one way, as an arc tangent of speed."""
+    """Dry friction that differs by direction; an arc tangent of speed smooths its sign."""
 
     forward_nm: float
     backward_nm: float
@@ -140,7 +140,7 @@ class OneSidedFriction(Formula):
 
 @dataclass
 class Churning(Formula):
-    """Oil that is churned: the power 7/4 of speed, of turbulent flow (Blasius 1913)."""
+    """Churning of oil: friction with the power 7/4 of speed, as in turbulent flow (Blasius 1913)."""
 
     torque_nm: float
     speed_rad_s: float
@@ -153,7 +153,7 @@ class Churning(Formula):
 
 @dataclass
 class TanhStribeck(Formula):
-    """Friction of three hyperbolic tangents of speed, differentiable everywhere (Makkar et al. 2005)."""
+    """Friction as three hyperbolic tangents of speed, differentiable everywhere (Makkar et al. 2005)."""
 
     dry_nm: float
     excess_nm: float
@@ -169,7 +169,7 @@ class TanhStribeck(Formula):
 
 @dataclass
 class ArctanLoadFriction(Formula):
-    """Friction that follows the gear's torque, its sign an arc tangent of speed."""
+    """Friction proportional to the gear's torque; an arc tangent of speed smooths its sign."""
 
     share: float
     corner_rad_s: float
@@ -182,7 +182,7 @@ class ArctanLoadFriction(Formula):
 
 @dataclass
 class WarmingFriction(Formula):
-    """Viscous friction that falls or grows with the time a machine has run, as its oil warms."""
+    """Viscous friction that changes with running time, as oil warms."""
 
     viscous_nm_s_rad: float
     time_s: float
@@ -194,12 +194,12 @@ class WarmingFriction(Formula):
 
 @dataclass
 class Play(Formula):
-    """A gear that pulls and damps only in contact, its corners rounded off (hyperbolas)."""
+    """A gear that pulls and damps only in contact; hyperbolas round its corners."""
 
     half_width_rad: float
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
-        """Return what the gear lacks without contact."""
+        """Return the missing gear torque without contact."""
         round_off = 0.05 * self.half_width_rad
         above, below = (
             np.hypot(at.deflection + s * self.half_width_rad, round_off) for s in (1.0, -1.0)
@@ -214,12 +214,12 @@ class Play(Formula):
 
 @dataclass
 class HardeningSpring(Formula):
-    """A gear whose spring is the hyperbolic sine of its deflection; ``cubic_nm_rad3``: its third order."""
+    """A gear spring with a hyperbolic sine of deflection; ``cubic_nm_rad3``: its third-order coefficient."""
 
     cubic_nm_rad3: float
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
-        """Return what is beyond the linear spring."""
+        """Return the torque beyond the linear spring."""
         a = np.sqrt(6 * self.cubic_nm_rad3 / at.stiffness)
         x = np.clip(a * at.deflection, -20.0, 20.0)
         return _through_gear(at, at.stiffness * (np.sinh(x) - x) / a)
@@ -227,13 +227,13 @@ class HardeningSpring(Formula):
 
 @dataclass
 class RoundedKnee(Formula):
-    """A gear with two stiffnesses, the knee between them rounded off (hyperbola)."""
+    """A gear with two stiffnesses; a hyperbola rounds the knee between them."""
 
     more_nm_rad: float
     knee_rad: float
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
-        """Return what is stiffer beyond the knee."""
+        """Return the additional torque beyond the knee."""
         beyond = np.abs(at.deflection) - self.knee_rad
         past = 0.5 * (beyond + np.hypot(beyond, 0.05 * self.knee_rad))
         return _through_gear(at, self.more_nm_rad * np.sign(at.deflection) * past)
@@ -241,31 +241,31 @@ class RoundedKnee(Formula):
 
 @dataclass
 class SmoothMiddle(Formula):
-    """A gear whose teeth come into contact one after another: softer by a bell of the deflection."""
+    """A gear whose teeth meet one after another: a bell curve of deflection makes it softer."""
 
     less_nm_rad: float
     half_width_rad: float
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
-        """Return what the spring lacks."""
+        """Return the missing spring torque."""
         within = self.half_width_rad * np.tanh(at.deflection / self.half_width_rad)
         return _through_gear(at, -self.less_nm_rad * within)
 
 
 @dataclass
 class WeakSupply(Formula):
-    """A drive whose torque falls as its supply does under the power drawn, by an exponential."""
+    """A drive whose torque falls exponentially with the power drawn, as its supply weakens."""
 
     share_1_w: float
     told_nm: Array = field(default_factory=lambda: np.zeros(1))
 
     def command(self, torque: Array) -> Array:
-        """Remember what the drive was told."""
+        """Keep the command, and return it unchanged."""
         self.told_nm = torque
         return torque
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
-        """Return what is missing of it."""
+        """Return the missing torque on the motor."""
         if self.told_nm.shape != at.motor_speed.shape:
             return 0.0, 0.0
         drawn = np.maximum(self.told_nm * at.motor_speed, 0.0)
@@ -274,19 +274,19 @@ class WeakSupply(Formula):
 
 @dataclass
 class RunOut(Formula):
-    """An encoder on the joint with a wave of its reading over the turn."""
+    """An encoder on the joint whose error is a sine of the joint's angle."""
 
     amplitude_rad: float
     phase: float
     first: Array | None = None
 
     def begin(self, place: Place, step_s: float) -> None:
-        """Forget where the joints stood."""
+        """Forget the error at the first reading."""
         del place, step_s
         self.first = None
 
     def joint_sensor(self, joint: Array) -> Array | float:
-        """Return the error of the angle, counted from where it was asked first."""
+        """Return the error relative to that of the first reading."""
         error = np.asarray(self.amplitude_rad * np.sin(joint + self.phase))
         self.first = error if self.first is None else self.first
         return np.asarray(error - self.first)
@@ -294,18 +294,18 @@ class RunOut(Formula):
 
 @dataclass
 class Counter(Formula):
-    """An encoder of few lines that counts the nearest."""
+    """An encoder with few lines that rounds to the nearest."""
 
     line_rad: float
 
     def read(self, angle: Array) -> Array:
-        """Return its angle."""
+        """Return the angle of the nearest line."""
         return np.asarray(np.round(angle / self.line_rad) * self.line_rad)
 
 
 @dataclass
 class DahlGear(Formula):
-    """A gear part of whose spring slips as a Dahl bristle does."""
+    """A gear whose spring slips in part, like a Dahl bristle."""
 
     stiffness: float
     slip_nm: float
@@ -334,7 +334,7 @@ class DahlGear(Formula):
 
 @dataclass
 class GearError(Formula):
-    """A gear whose angle has an error periodic in the motor's, with a small second harmonic."""
+    """A gear with an angle error periodic in the motor angle, plus a small second harmonic."""
 
     order: float
     amplitude_rad: float
@@ -342,7 +342,7 @@ class GearError(Formula):
     harmonic: float = 0.03
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
-        """Return what the error adds to the gear's torque; the power it takes comes from the motor."""
+        """Return the torque that the angle error adds; the motor supplies its power."""
         angle = self.order * at.motor + self.phase
         shape = np.sin(angle) + self.harmonic * np.sin(2 * angle)
         slope = np.cos(angle) + 2 * self.harmonic * np.cos(2 * angle)
@@ -354,7 +354,7 @@ class GearError(Formula):
 
 @dataclass
 class Cogging(Formula):
-    """Torque of a motor periodic in its angle, under load or without."""
+    """Cogging: a motor torque periodic in the motor angle, independent of load."""
 
     orders: Sequence[float]
     amplitudes_nm: Sequence[float]
@@ -368,10 +368,10 @@ class Cogging(Formula):
 
 @dataclass
 class ResolverImbalance(Formula):
-    """A resolver whose two windings differ: its angle is the arc tangent of unequal signals.
+    """A resolver with unequal windings: its angle is the arc tangent of unequal signals.
 
-    ``pairs`` of poles; ``imbalance`` relative amplitude and ``offset`` of one winding: waves of
-    twice and once the electrical angle.
+    ``pairs``: pole pairs. ``imbalance``: relative amplitude error, a wave at twice the electrical angle.
+    ``offset`` of one winding: a wave at the electrical angle.
     """
 
     pairs: int
@@ -379,10 +379,10 @@ class ResolverImbalance(Formula):
     offset: float
 
     def sensor(self, motor: Array) -> Array | float:
-        """Return the error of the angle."""
+        """Return the angle error [rad]."""
         angle = self.pairs * motor
         sine, cosine = (1 + self.imbalance) * np.sin(angle), np.cos(angle) + self.offset
-        # Of the sine and cosine of the difference: no turns to count.
+        # Sine and cosine of the difference: no turns to count.
         apart = np.arctan2(
             sine * np.cos(angle) - cosine * np.sin(angle),
             cosine * np.cos(angle) + sine * np.sin(angle),
@@ -392,18 +392,18 @@ class ResolverImbalance(Formula):
 
 @dataclass
 class ConstantTorque(Formula):
-    """A torque that is always there."""
+    """A constant torque on the motor."""
 
     torque_nm: float
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
-        """Return it."""
+        """Return the constant torque on the motor."""
         del at
         return self.torque_nm, 0.0
 
 
 class DelayLine(Formula):
-    """A drive that holds commands and makes them later, by any time."""
+    """A drive that delays commands by any time."""
 
     def __init__(self, delay_s: float) -> None:
         self.delay_s = delay_s
@@ -416,7 +416,7 @@ class DelayLine(Formula):
         self.step_s, self.line = step_s, []
 
     def command(self, torque: Array) -> Array:
-        """Return the mean over the step of what was commanded before."""
+        """Return the mean delayed command over the step."""
         steps = self.delay_s / self.step_s
         whole = int(steps)
         self.line = [*self.line[-(whole + 1) :], torque]
@@ -425,7 +425,7 @@ class DelayLine(Formula):
 
 
 class Lag(Formula):
-    """A drive whose torque follows its command exponentially; exact over every step."""
+    """A drive with a first-order lag, exact over every step."""
 
     def __init__(self, time_constant_s: float) -> None:
         self.time_constant_s = time_constant_s
@@ -433,7 +433,7 @@ class Lag(Formula):
         self.made: Array | None = None
 
     def begin(self, place: Place, step_s: float) -> None:
-        """Begin in balance."""
+        """Start in balance."""
         del place
         self.step_s, self.made = step_s, None
 
@@ -447,7 +447,7 @@ class Lag(Formula):
 
 
 class ResonantLoop(Formula):
-    """A drive with a current loop of second order, T^2 y'' + 2 D T y' + y = u; exact over every step."""
+    """A drive with a second-order current loop, T^2 y'' + 2 D T y' + y = u, exact over every step."""
 
     def __init__(self, time_constant_s: float, damping: float) -> None:
         self.time_constant_s, self.damping = time_constant_s, damping
@@ -455,9 +455,9 @@ class ResonantLoop(Formula):
         self.state: Array | None = None
 
     def begin(self, place: Place, step_s: float) -> None:
-        """Begin in balance."""
+        """Start in balance."""
         del place
-        # Of torque, its rate in units of the time constant, their mean over the step, and the command.
+        # States: torque, its rate times the time constant, its mean over the step, the command.
         share, d = step_s / self.time_constant_s, self.damping
         rates = [[0, share, 0, 0], [-share, -2 * d * share, 0, share], [1, 0, 0, 0], [0, 0, 0, 0]]
         self.ahead, self.state = scipy.linalg.expm(np.array(rates, np.float64)), None
@@ -472,7 +472,7 @@ class ResonantLoop(Formula):
 
 
 class StaleSensor(Formula):
-    """A sensor that says where the motor was some samples ago."""
+    """A sensor that returns the motor angle of some samples ago."""
 
     def __init__(self, samples: int) -> None:
         self.samples = samples
@@ -484,26 +484,26 @@ class StaleSensor(Formula):
         self.line = []
 
     def sensor(self, motor: Array) -> Array | float:
-        """Return by how much it is off."""
+        """Return the difference to the present angle."""
         self.line = [*self.line[-self.samples :], motor]
         return np.asarray(self.line[0] - motor)
 
 
 @dataclass
 class WrongReport(Formula):
-    """A drive that reports a share of its torque less a constant."""
+    """A drive that reports a share of its torque minus a constant."""
 
     share: float = 1.0
     less_nm: float = 0.0
 
     def reported(self, torque: Array) -> Array:
-        """Return what it says."""
+        """Return the reported torque."""
         return np.asarray(self.share * torque - self.less_nm)
 
 
 @dataclass
 class CurrentLimit(Formula):
-    """A drive that gives no more, and reports what it gives."""
+    """A drive with limited torque, which reports the limited torque."""
 
     limit_nm: float
 
@@ -516,32 +516,32 @@ class CurrentLimit(Formula):
 
 @dataclass
 class DeadZone(Formula):
-    """A drive that makes nothing of small commands."""
+    """A drive that ignores small commands."""
 
     width_nm: float
 
     def command(self, torque: Array) -> Array:
-        """Return what is beyond the zone."""
+        """Return the part of the command beyond the zone."""
         return np.asarray(torque - np.clip(torque, -self.width_nm, self.width_nm))
 
 
 @dataclass
 class Tone(Formula):
-    """A torque from outside, at a frequency of its own."""
+    """An external torque on the motor at a fixed frequency."""
 
     amplitude_nm: float
     frequency_hz: float
     phase: float
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
-        """Return it."""
+        """Return the torque on the motor."""
         angle = 2 * np.pi * self.frequency_hz * at.time_s + self.phase
         return self.amplitude_nm * float(np.sin(angle)), 0.0
 
 
 @dataclass
 class Push(Formula):
-    """Somebody who leans on the arm for a while, other than the motions do."""
+    """A person who leans on the arm for a while, independent of the motions."""
 
     torque_nm: float
     from_s: float
@@ -556,7 +556,7 @@ class Push(Formula):
 
 @dataclass
 class LateFriction(Formula):
-    """Dry friction that is there from some time on."""
+    """Dry friction that sets in at some time."""
 
     friction_nm: float
     corner_rad_s: float
@@ -570,7 +570,7 @@ class LateFriction(Formula):
 
 @dataclass
 class QuadraticDamper(Formula):
-    """A gear damped by the square of the rate of its deflection, against it."""
+    """A gear damper with the square of the deflection rate."""
 
     quadratic_nm_s2_rad2: float
 

@@ -1,4 +1,4 @@
-"""Formulas of friction that remembers, is uneven or acts behind the gear, in the engine on Pinocchio."""
+"""Friction with memory, uneven friction and friction behind the gear, for the engine on Pinocchio."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from axisight.blind.formulas import Formula, Place
 
 Array = NDArray[np.float64]
 
-# Ways, of their mean, after which elements slip one after another.
+# Slip displacements of the elements, relative to their mean.
 _SPREAD = np.array([0.25, 0.75, 1.25, 1.75])
 
 
 @dataclass
 class SlidingElements(Formula):
-    """Dry friction of the motor by equal elements in parallel, each elastic up to its own way (Al-Bender 2005)."""
+    """Dry friction of the motor as equal parallel elements, elastic up to their slips (Al-Bender 2005)."""
 
     dry_nm: float
     way_rad: float
@@ -44,7 +44,7 @@ class SlidingElements(Formula):
 
 @dataclass
 class UnevenArctan(Formula):
-    """Dry friction of the joint that is larger in some places, its sign an arc tangent of speed."""
+    """Dry friction of the joint that depends on its angle; an arc tangent of speed smooths the sign."""
 
     dry_nm: float
     share: float
@@ -60,12 +60,12 @@ class UnevenArctan(Formula):
 
 @dataclass
 class BehindGear(Formula):
-    """A formula of the motor that the arm feels: by angle and speed of the joint."""
+    """A motor's friction formula applied to the joint: it takes angle and speed of the joint."""
 
     formula: Formula
 
     def begin(self, place: Place, step_s: float) -> None:
-        """Begin as the formula does."""
+        """Start the wrapped formula."""
         self.formula.begin(_unbent(place), step_s)
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
@@ -73,12 +73,12 @@ class BehindGear(Formula):
         return 0.0, self.formula.torque(_unbent(at))[0] / at.gear_ratio
 
     def moved(self, at: Place) -> None:
-        """End a step as the formula does."""
+        """End a step of the wrapped formula."""
         self.formula.moved(_unbent(at))
 
 
 def _unbent(at: Place) -> Place:
-    """Return where the motor would be if the gear did not bend."""
+    """Return the state that a rigid gear would have."""
     turns, still = 1.0 / at.gear_ratio, np.zeros_like(at.motor)
     motor, speed = turns * at.joint, turns * at.joint_speed
     return replace(at, motor=motor, motor_speed=speed, deflection=still, deflection_rate=still)

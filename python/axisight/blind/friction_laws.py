@@ -1,4 +1,4 @@
-"""Laws of friction that remember where the axis was, that are larger in some places, or act behind the gear."""
+"""Friction laws with memory, with dependence on the angle, or behind the gear."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from math import copysign, sin
 
 from axisight.blind.laws import Axis, Law
 
-# Of the strain at which bristles slip, up to which they only bend (Dupont et al. 2002).
+# Share of the slip strain up to which bristles only bend (Dupont et al. 2002).
 _ELASTIC = 0.6
 
 
 @dataclass
 class ElastoPlastic(Law):
-    """Bristles of the motor that bend, and slip the more the nearer they are to what they hold."""
+    """Bristles of the motor that bend, and slip more as they near their largest strain."""
 
     dry_nm: float
     way_rad: float
@@ -38,7 +38,7 @@ class ElastoPlastic(Law):
 
 @dataclass
 class UnevenFriction(Law):
-    """Dry friction of the joint, larger where a wave over its angle is: ``waves`` of them in a radian."""
+    """Dry friction of the joint that varies as a wave over its angle; ``waves`` per radian."""
 
     dry_nm: float
     share: float
@@ -54,12 +54,12 @@ class UnevenFriction(Law):
 
 @dataclass
 class BehindGear(Law):
-    """A law of the motor that the arm feels: by angle and speed of the joint, as a motor without elasticity turns."""
+    """A motor's friction law applied to the joint: it takes the state of a motor on a rigid gear."""
 
     law: Law
 
     def begin(self, step_s: float) -> None:
-        """Begin as the law does."""
+        """Start the wrapped law."""
         self.law.begin(step_s)
 
     def torque(self, at: Axis) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Formulas of what hangs on a joint, in the engine on Pinocchio: balancers, hoses, masses on springs."""
+"""Formulas of parts on a joint, for the engine on Pinocchio: balancers, hoses, masses on springs."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ Array = NDArray[np.float64]
 
 @dataclass
 class SpringBalancer(Formula):
-    """A spring between a point of the base and one of the link, slack at its free length.
+    """A spring between a point of the base and a point of the link, slack at its free length.
 
-    Lengths are in that from the joint to the point of the base: ``crank`` to that of the link, ``free`` of the
-    spring; ``force_nm`` its stiffness times both levers. It pulls most where the link is across.
+    Lengths are relative to that from the joint to the point of the base: ``crank`` to the point of the link,
+    ``free`` length of the spring. ``force_nm``: stiffness times both levers. The torque is largest where the
+    link stands across.
     """
 
     force_nm: float
@@ -26,7 +27,7 @@ class SpringBalancer(Formula):
     angle_rad: float
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
-        """Return it on the joint."""
+        """Return the torque on the joint."""
         angle = at.joint + self.angle_rad
         length = np.sqrt(1 + self.crank**2 + 2 * self.crank * np.cos(angle))
         pull = np.maximum(1 - self.free / length, 0.0)
@@ -35,20 +36,20 @@ class SpringBalancer(Formula):
 
 @dataclass
 class WoundHose(Formula):
-    """A hose about the joint that is the stiffer the further it is wound."""
+    """A hose around the joint that stiffens as it winds up."""
 
     stiffness_nm_rad: float
     wound_rad: float
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
-        """Return it on the joint."""
+        """Return the torque on the joint."""
         wound = self.stiffness_nm_rad * self.wound_rad
         return 0.0, -wound * np.sinh(at.joint / self.wound_rad)
 
 
 @dataclass
 class HungMass(Formula):
-    """A mass that hangs on the joint by a spring and a damper; trapezoids from where a step began."""
+    """A mass on a spring and a damper on the joint; trapezoidal rule from the start of the step."""
 
     inertia_kg_m2: float
     frequency_hz: float
@@ -57,7 +58,7 @@ class HungMass(Formula):
     time_s: float = 0.0
 
     def begin(self, place: Place, step_s: float) -> None:
-        """Hang at rest."""
+        """Start at rest."""
         del step_s
         self.state = place.joint, place.joint_speed, np.zeros_like(place.joint)
         self.time_s = place.time_s
@@ -74,9 +75,9 @@ class HungMass(Formula):
         return where, then, spring * (at.joint - where) + damper * (at.joint_speed - then)
 
     def torque(self, at: Place) -> tuple[Array | float, Array | float]:
-        """Return what it pulls the joint with."""
+        """Return the torque of the mass on the joint."""
         return 0.0, -self.inertia_kg_m2 * self._moved(at)[2]
 
     def moved(self, at: Place) -> None:
-        """Keep where it is."""
+        """Keep the state of the mass."""
         self.state, self.time_s = self._moved(at), at.time_s

@@ -1,4 +1,4 @@
-"""Laws of what hangs on a joint and its simulator does not know of: balancers, cables, masses on springs."""
+"""Laws of parts on a joint that the simulator lacks: balancers, cables, masses on springs."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ from axisight.blind.laws import Axis, Law
 
 @dataclass
 class Balancer(Law):
-    """A spring of no free length from the base to a link: the sine of the joint's angle."""
+    """A spring without free length between base and link: its torque is a sine of the joint's angle."""
 
     sine_nm: float
     cosine_nm: float
 
     def torque(self, at: Axis) -> tuple[float, float]:
-        """Return it on the joint."""
+        """Return the torque on the joint."""
         return 0.0, self.sine_nm * sin(at.joint) + self.cosine_nm * cos(at.joint)
 
 
 @dataclass
 class Cable(Law):
-    """Cables that pull a joint back to where they rest."""
+    """Cables that pull a joint back to their rest angle."""
 
     stiffness_nm_rad: float
     rest_rad: float = 0.0
 
     def torque(self, at: Axis) -> tuple[float, float]:
-        """Return it on the joint."""
+        """Return the torque on the joint."""
         return 0.0, -self.stiffness_nm_rad * (at.joint - self.rest_rad)
 
 
 @dataclass
 class Swing(Law):
-    """A mass on a spring on the joint; trapezoids in time, from where it hung when it began."""
+    """A mass on a spring on the joint; trapezoidal rule in time."""
 
     inertia_kg_m2: float
     frequency_hz: float
@@ -45,12 +45,12 @@ class Swing(Law):
     acceleration: float = 0.0
 
     def begin(self, step_s: float) -> None:
-        """Hang at rest, wherever the joint is."""
+        """Start at rest relative to the joint."""
         del step_s
         self.before = None
 
     def torque(self, at: Axis) -> tuple[float, float]:
-        """Return what it pulls the joint with."""
+        """Return the torque of the mass on the joint."""
         if self.before is None:
             self.angle, self.speed, self.acceleration = at.joint, at.joint_speed, 0.0
             self.before = at

@@ -1,7 +1,7 @@
-"""Laws that a machine follows and its simulator does not, from other papers than the library's.
+"""Laws that a machine follows and its simulator lacks; they come from other papers than the library's.
 
-A law acts on one axis. Every step it is told where the axis is, and answers with a torque on the motor
-and one on the joint; it may bend what the sensor says and what the drive does with a command.
+A law acts on one axis. Every step it gets the state of the axis and returns a torque on the motor and one on
+the joint. It may also change sensor readings and what the drive makes of a command.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from math import atan2, copysign, cos, exp, floor, pi, sin
 
 @dataclass(frozen=True)
 class Axis:
-    """Where an axis is: time [s], motor angle [rad] and speed [rad/s], the joint's, gear deflection."""
+    """State of an axis: time [s], angle [rad] and speed [rad/s] of motor and joint, gear deflection [rad]."""
 
     time_s: float
     motor: float
@@ -23,19 +23,19 @@ class Axis:
     joint_speed: float
     gear_ratio: float
     gear_torque: float
-    """Of the spring, on the joint [Nm]."""
+    """Torque of the gear spring on the joint [Nm]."""
 
     @property
     def deflection(self) -> float:
-        """Of the gear, joint side [rad]."""
+        """Gear deflection, joint side [rad]."""
         return self.gear_ratio * self.motor - self.joint
 
 
 class Law:
-    """A law that does nothing: the base of all others."""
+    """A law that does nothing: the base class."""
 
     def begin(self, step_s: float) -> None:
-        """Forget what was; steps will be this long."""
+        """Start anew, with steps of ``step_s`` [s]."""
 
     def torque(self, at: Axis) -> tuple[float, float]:
         """Return the torque on the motor and on the joint [Nm]."""
@@ -43,25 +43,25 @@ class Law:
         return 0.0, 0.0
 
     def sensor(self, motor: float) -> float:
-        """Return what the sensor says more than the motor angle [rad]."""
+        """Return the error of the motor sensor [rad]."""
         del motor
         return 0.0
 
     def joint_sensor(self, joint: float) -> float:
-        """Return what the sensor says more than the joint angle, if it sits there [rad]."""
+        """Return the error of a sensor on the joint [rad]."""
         del joint
         return 0.0
 
     def read(self, angle: float) -> float:
-        """Return the angle as it is read, noise included [rad]."""
+        """Return the reading of an angle that includes noise [rad]."""
         return angle
 
     def command(self, torque: float) -> float:
-        """Return the torque the drive makes of a command [Nm], every step."""
+        """Return the torque that the drive makes of a command [Nm]; called every step."""
         return torque
 
     def reported(self, torque: float) -> float:
-        """Return the command as the drive reports it [Nm]."""
+        """Return the reported torque [Nm] of a command [Nm]."""
         return torque
 
 
@@ -83,7 +83,7 @@ class ExponentialStribeck(Law):
 
 @dataclass
 class Warmup(Law):
-    """Viscous friction that comes or goes as 1 - exp(-t / T)."""
+    """Viscous friction that appears or vanishes as 1 - exp(-t / T)."""
 
     viscous_nm_s_rad: float
     time_s: float
@@ -96,7 +96,7 @@ class Warmup(Law):
 
 @dataclass
 class LoadFriction(Law):
-    """Friction that follows the load: a share of the gear torque as the motor feels it."""
+    """Friction proportional to the gear torque, referred to the motor."""
 
     share: float
     corner_rad_s: float
@@ -110,7 +110,7 @@ class LoadFriction(Law):
 
 @dataclass
 class OneSidedFriction(Law):
-    """Dry friction that is larger one way, sign smoothed by v / (|v| + v0)."""
+    """Dry friction that differs by direction; v / (|v| + v0) smooths its sign."""
 
     forward_nm: float
     backward_nm: float
@@ -135,19 +135,19 @@ class Drag(Law):
 
 
 class MaxwellSlip(Law):
-    """A gear that slips: springs in parallel, each through a slider that gives way."""
+    """A gear that slips: parallel springs, each in series with a slider."""
 
     def __init__(self, stiffness: Sequence[float], slip_rad: Sequence[float]) -> None:
         self.stiffness, self.slip = list(stiffness), list(slip_rad)
         self.anchor = [0.0] * len(self.slip)
 
     def begin(self, step_s: float) -> None:
-        """Let all springs go."""
+        """Relax all springs."""
         del step_s
         self.anchor = [0.0] * len(self.slip)
 
     def torque(self, at: Axis) -> tuple[float, float]:
-        """Return what the slipping springs add to the gear's."""
+        """Return the torque that the slipping springs add to the gear's."""
         total = 0.0
         for i, (k, slip) in enumerate(zip(self.stiffness, self.slip, strict=True)):
             stretch = at.deflection - self.anchor[i]
@@ -159,12 +159,16 @@ class MaxwellSlip(Law):
 
 
 class HeldSpring(Law):
-    """A spring whose torque is held over a step: half of it late, a stiff one would feed a swing."""
+    """A spring whose torque the engine holds over a step.
+
+    The held torque is late by half a step, by which a stiff spring would drive an oscillation. The law
+    therefore takes the deflection in the middle of the step.
+    """
 
     half_step_s = 0.0
 
     def begin(self, step_s: float) -> None:
-        """Remember half a step."""
+        """Keep half a step."""
         self.half_step_s = 0.5 * step_s
 
     def deflection(self, at: Axis) -> float:
@@ -175,7 +179,7 @@ class HeldSpring(Law):
 
 @dataclass
 class CubicSpring(HeldSpring):
-    """A gear that stiffens with the cube of its deflection."""
+    """A gear whose stiffness grows with its deflection: a cubic torque."""
 
     cubic_nm_rad3: float
 
@@ -187,13 +191,13 @@ class CubicSpring(HeldSpring):
 
 @dataclass
 class KneeSpring(HeldSpring):
-    """A gear with one stiffness up to some deflection and another beyond."""
+    """A gear with one stiffness up to a knee and another beyond it."""
 
     more_nm_rad: float
     knee_rad: float
 
     def torque(self, at: Axis) -> tuple[float, float]:
-        """Return what is stiffer beyond the knee, in the middle of the step."""
+        """Return the additional torque beyond the knee, in the middle of the step."""
         deflection = self.deflection(at)
         beyond = copysign(max(abs(deflection) - self.knee_rad, 0.0), deflection)
         total = self.more_nm_rad * beyond
@@ -202,13 +206,13 @@ class KneeSpring(HeldSpring):
 
 @dataclass
 class SoftMiddle(HeldSpring):
-    """A gear that is softer up to some deflection, where few teeth carry."""
+    """A gear that is softer at small deflection, where few teeth carry."""
 
     less_nm_rad: float
     half_width_rad: float
 
     def torque(self, at: Axis) -> tuple[float, float]:
-        """Return what the spring lacks, in the middle of the step."""
+        """Return the missing spring torque, in the middle of the step."""
         deflection = self.deflection(at)
         within = min(max(deflection, -self.half_width_rad), self.half_width_rad)
         total = -self.less_nm_rad * within
@@ -217,25 +221,25 @@ class SoftMiddle(HeldSpring):
 
 @dataclass
 class Sag(Law):
-    """A drive whose torque falls in proportion to the power that it draws."""
+    """A drive whose torque falls in proportion to the power drawn."""
 
     share_1_w: float
     told_nm: float = 0.0
 
     def command(self, torque: float) -> float:
-        """Remember what the drive was told."""
+        """Keep the command, and return it unchanged."""
         self.told_nm = torque
         return torque
 
     def torque(self, at: Axis) -> tuple[float, float]:
-        """Return what is missing of it."""
+        """Return the missing torque on the motor."""
         drawn = max(self.told_nm * at.motor_speed, 0.0)
         return -self.told_nm * min(self.share_1_w * drawn, 0.9), 0.0
 
 
 @dataclass
 class GearWave(Law):
-    """A gear whose angle waves with the motor's, a Fourier series; power is conserved or not."""
+    """A gear with an angle error that is a Fourier series of the motor angle; power is conserved or not."""
 
     stiffness: float
     order: float
@@ -244,7 +248,7 @@ class GearWave(Law):
     conserves: bool
 
     def torque(self, at: Axis) -> tuple[float, float]:
-        """Return what the wave of the angle adds to the gear's torque."""
+        """Return the torque that the angle error adds to the gear's."""
         angle = self.order * at.motor + self.phase
         wave = self.amplitude_rad * (sin(angle) - sin(self.phase))
         total = self.stiffness * wave
@@ -255,7 +259,7 @@ class GearWave(Law):
 
 @dataclass
 class MotorWave(Law):
-    """Torque that waves with the motor angle: cogging and the like."""
+    """Motor torque that is a Fourier series of the motor angle, such as cogging."""
 
     orders: Sequence[float]
     amplitudes_nm: Sequence[float]
@@ -269,14 +273,14 @@ class MotorWave(Law):
 
 @dataclass
 class SensorWave(Law):
-    """A resolver whose angle waves over a turn."""
+    """A resolver with a periodic angle error."""
 
     orders: Sequence[float]
     amplitudes_rad: Sequence[float]
     phases: Sequence[float]
 
     def sensor(self, motor: float) -> float:
-        """Return the error of the angle."""
+        """Return the angle error [rad]."""
         terms = zip(self.orders, self.amplitudes_rad, self.phases, strict=True)
         return sum(a * sin(n * motor + p) for n, a, p in terms)
 
@@ -290,7 +294,7 @@ class EccentricDisc(Law):
     first: float | None = None
 
     def begin(self, step_s: float) -> None:
-        """Count from where the joint will stand."""
+        """Count from the joint's first angle."""
         del step_s
         self.first = None
 
@@ -304,29 +308,29 @@ class EccentricDisc(Law):
 
 @dataclass
 class FewLines(Law):
-    """An encoder of few lines: it counts them."""
+    """An encoder with few lines that counts the lines passed."""
 
     line_rad: float
 
     def read(self, angle: float) -> float:
-        """Return the last line passed, and half of one."""
+        """Return the angle of the last line passed plus half a line."""
         return (floor(angle / self.line_rad) + 0.5) * self.line_rad
 
 
 @dataclass
 class Offset(Law):
-    """A torque that is always there."""
+    """A constant torque on the motor."""
 
     torque_nm: float
 
     def torque(self, at: Axis) -> tuple[float, float]:
-        """Return it."""
+        """Return the constant torque on the motor."""
         del at
         return self.torque_nm, 0.0
 
 
 class Delay(Law):
-    """A drive that does everything later."""
+    """A drive that delays commands."""
 
     def __init__(self, delay_s: float) -> None:
         self.delay_s = delay_s
@@ -343,10 +347,7 @@ class Delay(Law):
 
 
 class ResonantLoop(Law):
-    """A drive whose torque swings about its command before it follows: T^2 y'' + 2 D T y' + y = u.
-
-    One implicit midpoint step each.
-    """
+    """A drive with a second-order current loop, T^2 y'' + 2 D T y' + y = u, by the implicit midpoint rule."""
 
     def __init__(self, time_constant_s: float, damping: float) -> None:
         self.time_constant_s, self.damping = time_constant_s, damping
@@ -355,7 +356,7 @@ class ResonantLoop(Law):
         self.rate = 0.0
 
     def begin(self, step_s: float) -> None:
-        """Begin in balance."""
+        """Start in balance."""
         self.half = 0.5 * step_s / self.time_constant_s
         self.made, self.rate = None, 0.0
 
@@ -363,14 +364,14 @@ class ResonantLoop(Law):
         """Return the mean torque over the step."""
         before = torque if self.made is None else self.made
         h, damped = self.half, 1 + 2 * self.damping * self.half
-        # The rate half a step on, in units of the time constant.
+        # The rate in the middle of the step, times the time constant.
         rate = (self.rate + h * (torque - before)) / (damped + h * h)
         self.made, self.rate = before + 2 * h * rate, 2 * rate - self.rate
         return before + h * rate
 
 
 class LateSensor(Law):
-    """A sensor that says where the motor was some samples ago; it is asked once a sample."""
+    """A sensor that returns the motor angle of some samples ago; called once a sample."""
 
     def __init__(self, samples: int) -> None:
         self.samples = samples
@@ -382,19 +383,19 @@ class LateSensor(Law):
         self.line = deque(maxlen=self.samples + 1)
 
     def sensor(self, motor: float) -> float:
-        """Return by how much it is off."""
+        """Return the difference to the present angle."""
         self.line.append(motor)
         return self.line[0] - motor
 
 
 @dataclass
 class ReportedLess(Law):
-    """A drive that reports its torque less a constant."""
+    """A drive that reports its torque minus a constant."""
 
     offset_nm: float
 
     def reported(self, torque: float) -> float:
-        """Return what it says."""
+        """Return the reported torque."""
         return torque - self.offset_nm
 
 
@@ -405,13 +406,13 @@ class Reported(Law):
     share: float
 
     def reported(self, torque: float) -> float:
-        """Return what it says."""
+        """Return the reported torque."""
         return self.share * torque
 
 
 @dataclass
 class Limit(Law):
-    """A drive that gives no more, and reports what it gives."""
+    """A drive with limited torque, which reports the limited torque."""
 
     limit_nm: float
 
@@ -424,31 +425,31 @@ class Limit(Law):
 
 @dataclass
 class Deadband(Law):
-    """A drive that makes nothing of small commands."""
+    """A drive that ignores small commands."""
 
     width_nm: float
 
     def command(self, torque: float) -> float:
-        """Return what is beyond the band."""
+        """Return the part of the command beyond the band."""
         return copysign(max(abs(torque) - self.width_nm, 0.0), torque)
 
 
 @dataclass
 class Tone(Law):
-    """A torque from outside, at a frequency of its own."""
+    """An external torque on the motor at a fixed frequency."""
 
     amplitude_nm: float
     frequency_hz: float
     phase: float
 
     def torque(self, at: Axis) -> tuple[float, float]:
-        """Return it."""
+        """Return the torque on the motor."""
         return self.amplitude_nm * sin(2 * pi * self.frequency_hz * at.time_s + self.phase), 0.0
 
 
 @dataclass
 class FrictionStep(Law):
-    """Dry friction that is there from some time on."""
+    """Dry friction that sets in at some time."""
 
     friction_nm: float
     corner_rad_s: float
@@ -463,7 +464,7 @@ class FrictionStep(Law):
 
 @dataclass
 class CubicDamper(Law):
-    """A gear damped by the cube of the speed of its deflection."""
+    """A gear damper with the cube of the deflection rate."""
 
     cubic_nm_s3_rad3: float
 

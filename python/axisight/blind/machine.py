@@ -1,4 +1,4 @@
-"""A machine as it really is: the robot, and what differs from its simulator; engines make it move."""
+"""A simulated machine: the robot, and everything in which it differs from its simulator."""
 
 from __future__ import annotations
 
@@ -19,17 +19,19 @@ L = TypeVar("L")
 
 @dataclass(frozen=True)
 class Native:
-    """What an engine changes by itself on one axis.
+    """Changes on one axis that an engine simulates itself.
 
-    ``half_width_rad``: the gear is slack within; ``friction_nm``: dry friction of the motor;
-    ``armature``: share of motor inertia added; ``spring``, ``damper``: shares added
-    to gear stiffness and damping; ``viscous``: share added to viscous friction of the motor;
-    ``gear``: share added to the torque of the actuator; ``lag_s``: its time constant; ``kp``, ``ki``: shares
-    added to the gains of the controller, ``filter_s`` the time constant of a filter on its speed;
-    ``zero_rad``: angle of the joint where it counts zero; ``for_rate``, ``for_speed``: torque fed forward
-    for the rate of the reference [Nm s^2/rad] and for the reference [Nm s/rad]; ``longer_m``: by how much
-    the next axis lies elsewhere in the link; ``turns_next``: share of its turn by which it turns the gear
-    of the next axis along.
+    - ``half_width_rad``: half the play of the gear.
+    - ``friction_nm``: dry friction of the motor.
+    - ``armature``, ``spring``, ``damper``, ``viscous``: shares added to motor inertia, gear stiffness, gear
+      damping and viscous friction of the motor.
+    - ``gear``: share added to the actuator's torque; ``lag_s``: time constant of the actuator.
+    - ``kp``, ``ki``: shares added to the controller's gains; ``filter_s``: time constant of its speed filter.
+    - ``zero_rad``: joint angle at which the joint reads zero.
+    - ``for_rate``, ``for_speed``: feedforward torque per rate of the reference [Nm s^2/rad] and per reference
+      [Nm s/rad].
+    - ``longer_m``: displacement of the next axis in the link.
+    - ``turns_next``: share of its rotation that this axis adds to the gear of the next one.
     """
 
     half_width_rad: float = 0.0
@@ -55,11 +57,12 @@ NOTHING = Native()
 
 @dataclass(frozen=True)
 class Ends:
-    """What differs at both ends of the arm.
+    """Changes at both ends of the arm.
 
-    ``tip_kg`` at ``tip_m`` in the frame of the last link; ``rocks_rad_nm``: compliance of the base about
-    x and y, none where it is zero, ``rocks_s`` their damping over stiffness; ``tilted_rad``: by how much the
-    base is turned about its y, then about its x.
+    - ``tip_kg`` at ``tip_m``: a load, in the frame of the last link.
+    - ``rocks_rad_nm``: compliance of the base about x and y, rigid where zero.
+    - ``rocks_s``: damping of the base over its stiffness.
+    - ``tilted_rad``: rotation of the base about y, then about x.
     """
 
     tip_kg: float = 0.0
@@ -70,7 +73,7 @@ class Ends:
 
     @property
     def springs(self) -> list[tuple[tuple[float, float, float], float]]:
-        """Axis and stiffness of each spring of the base, ground to arm."""
+        """Axis and stiffness [Nm/rad] of each spring of the base, from ground to arm."""
         named = zip(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), self.rocks_rad_nm, strict=True)
         return [(axis, 1 / c) for axis, c in named if c]
 
@@ -80,9 +83,9 @@ PLAIN = Ends()
 
 @dataclass(frozen=True)
 class Machine:
-    """A robot as it really is: native changes and laws of its engine by axis (from 0).
+    """A robot with native changes and laws of its engine, by axis (from 0).
 
-    ``fast``: by how much its clock is fast against that of the references [1].
+    ``fast``: by how much its clock is faster than that of the references [1].
     """
 
     robot: Robot
@@ -92,7 +95,7 @@ class Machine:
     fast: float = 0.0
 
     def met(self, reference: Array) -> Array:
-        """Return the reference (n, n_axes) as the machine's own clock meets it."""
+        """Return the reference (n, n_axes) in the time of the machine's clock."""
         if not self.fast:
             return reference
         at = np.arange(len(reference), dtype=np.float64)
@@ -100,13 +103,13 @@ class Machine:
         return np.asarray(scipy.interpolate.CubicSpline(at, reference)(wanted))
 
     def gravity_m_s2(self) -> Array:
-        """Return gravity (3,) as the base feels it."""
+        """Return gravity (3,) [m/s^2] in the frame of the base."""
         about_x, about_y = self.ends.tilted_rad
         turned = scipy.spatial.transform.Rotation.from_euler("yx", [about_y, about_x])
         return np.asarray(turned.inv().apply(self.robot.gravity_m_s2))
 
     def along(self) -> Array:
-        """Return by how much each motor's turn turns the joints' gears (n_axes, n_axes): its own and the next."""
+        """Return the coupling (n_axes, n_axes) of motors to gears: each turns its own, some the next too."""
         ratio = np.asarray(self.robot.gear_ratio, np.float64)
         out = np.diag(ratio)
         for axis, own in enumerate(self.of_axes()[:-1]):
@@ -114,7 +117,7 @@ class Machine:
         return out
 
     def origins(self) -> list[tuple[float, ...]]:
-        """Return where every joint lies in the link before [m]."""
+        """Return the position of every joint in the link before it [m]."""
         own, axis, out = self.of_axes(), -1, []
         for joint in self.robot.joints:
             where = tuple(float(x) for x in joint.origin_m)
@@ -126,11 +129,11 @@ class Machine:
         return out
 
     def of_axes(self) -> list[Native]:
-        """Return the native changes of every axis."""
+        """Return the native changes of every axis, in order."""
         return [self.native.get(axis, NOTHING) for axis in range(self.robot.n_axes)]
 
     def laws_of(self, kind: type[L]) -> list[tuple[int, L]]:
-        """Return axis (from 0) and law, all of a kind. Raises InputError for laws of another engine."""
+        """Return axis (from 0) and law of each law of a kind; raises InputError for another engine's law."""
         out = []
         for axis, laws in self.laws.items():
             for law in laws:

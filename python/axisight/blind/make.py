@@ -1,4 +1,4 @@
-"""Cases of a benchmark with their truth apart from them, sealed by a hash in the case."""
+"""Cases of a benchmark, with the truths in another folder; each case holds the hash of its truth."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from axisight.errors import InputError
 from axisight.storage import write_whole
 
 Array = NDArray[np.float64]
-# Torque and angle along references.
+# Torque [Nm] and angle [rad] along each reference.
 Logs = list[tuple[Array, Array]]
-# Of an engine: machine, references and noises of its runs to torques and angles.
+# An engine: machine, references and noises of all runs to torques and angles.
 Run = Callable[[Machine, Sequence[Array], Sequence[Array]], Logs]
 
 
-# Draws until a machine works.
+# Most draws until a machine works.
 _ATTEMPTS = 20
-# Times the largest torque of the simulator, from which a machine does not.
+# A machine that needs more than this multiple of the simulator's largest torque does not work.
 _RUNAWAY = 5.0
 
 
@@ -44,10 +44,10 @@ def make_cases(
     progress: Progress,
     choice: Choice = DRAWN,
 ) -> None:
-    """Write the cases of ``numbers`` to a folder, and their truths to another.
+    """Write the cases of ``numbers`` to one folder, and their truths to another.
 
-    A case is a function of (seed, number, choice). Cases that are there already stay as they are. Raises
-    InputError where the folders are one.
+    A case is a function of (seed, number, choice). Existing cases stay. Raises InputError if both folders are
+    the same, and if no draw of a case gives a machine that works.
     """
     if cases.resolve() == truths.resolve():
         raise InputError("truth: expected another folder than that of the cases")
@@ -69,14 +69,14 @@ def _make(cases: Path, truths: Path, seed: int, choice: Choice, number: int) -> 
 
 
 def _engine(name: str) -> Run:
-    """Return what makes machines move, and load only its library."""
+    """Return the ``run`` function of an engine; only its library is loaded."""
     return import_module(f"axisight.blind.{name}_engine").run  # type: ignore[no-any-return]
 
 
 def _runs(drawn: Draw, seed: int) -> tuple[Logs, Logs] | None:
-    """Return the logs, and the validation ones without noise; None of a machine that nobody would run.
+    """Return all logs, and the validation logs without noise; None if the machine does not work.
 
-    An effect may take the loop beyond its margin: it swings without end.
+    An effect may make the loop unstable.
     """
     rng = np.random.default_rng([seed, drawn.number, 1])
     references = [reference for _, reference in drawn.references.values()]
@@ -84,7 +84,7 @@ def _runs(drawn: Draw, seed: int) -> tuple[Logs, Logs] | None:
     validation = _validation(drawn)
     quiet = [np.zeros_like(x) for x in validation]
     try:
-        # An engine moves all runs of a machine at once where it can.
+        # One call per machine: some engines run all references at once.
         logs = _engine(drawn.engine)(drawn.machine, references + validation, noises + quiet)
     except InputError:
         return None
@@ -95,7 +95,7 @@ def _runs(drawn: Draw, seed: int) -> tuple[Logs, Logs] | None:
 
 
 def _noise(rng: np.random.Generator, drawn: Draw, shape: tuple[int, ...]) -> Array:
-    """Return noise of the sensors (n, n_axes) [rad], of the deviation that the robot states."""
+    """Return sensor noise (n, n_axes) [rad] with the standard deviation that the robot states."""
     white = drawn.robot.position_noise_std * rng.standard_normal(shape)
     if drawn.corner_hz is None:
         return np.asarray(white)
@@ -120,12 +120,12 @@ def _write(folder: Path, truth: Path, drawn: Draw, runs: tuple[Logs, Logs], seed
     case.finish(drawn.arm)
     text = json.dumps(_truth(drawn, seed, _severity(drawn, quiet)), indent=1)
     write_whole(truth, text)
-    # Last: a case with its seal is whole.
+    # Last, so that a case with a seal is complete.
     write_whole(folder / SEAL, seal_of(text) + "\n")
 
 
 def _in_steps(torque: Array, largest: Array, bits: int | None) -> Array:
-    """Return torques (n, n_axes) as a converter over twice the ``largest``, either way, has them."""
+    """Return torques (n, n_axes) [Nm] quantized by a converter of so many bits over twice ``largest``."""
     if bits is None:
         return torque
     step = 4 * np.maximum(largest, 1e-300) / 2**bits
@@ -152,7 +152,7 @@ def _truth(drawn: Draw, seed: int, severity: list[float]) -> dict[str, Any]:
 
 
 def _severity(drawn: Draw, with_it: Logs) -> list[float]:
-    """Return rms torque change by all effects over rms torque noise, largest validation log, by axis."""
+    """Return per axis the rms torque change by all effects over rms noise, in the log with most change."""
     robot = drawn.robot
     if not drawn.effects:
         return [0.0] * robot.n_axes

@@ -1,4 +1,4 @@
-"""Motions of the logs of a case, by the name of a plan; motors turn at up to 55 rad/s."""
+"""Motions of a case's logs, by the name of a plan; motors turn at up to 55 rad/s."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Array = NDArray[np.float64]
 References = dict[str, tuple[str, Array]]
 
 _SECONDS = 10.0
-# Of the plan with short logs.
+# Duration of a short log.
 _SHORT_S = 6.0
 
 
 def multisines(rng: np.random.Generator, robot: Robot) -> References:
-    """Return role and velocity reference (n, n_axes) [rad/s] of every log, by name: mostly multisines."""
+    """Return role and velocity reference (n, n_axes) [rad/s] of every log by name: mostly multisines."""
     time = _times(robot, _SECONDS)
     axes = robot.n_axes
     top, fresh = _speeds(rng, axes, 40.0, 55.0), _speeds(rng, axes, 30.0, 55.0)
@@ -36,7 +36,7 @@ def multisines(rng: np.random.Generator, robot: Robot) -> References:
 
 
 def point_to_point(rng: np.random.Generator, robot: Robot) -> References:
-    """Return moves and triangles only, as a machine makes them at work."""
+    """Return logs of moves and triangles only, as in production."""
     time, axes = _times(robot, _SECONDS), robot.n_axes
     out: References = {}
     for k, (low, high) in enumerate(((40.0, 55.0), (15.0, 30.0), (25.0, 55.0), (5.0, 15.0)), 1):
@@ -50,7 +50,7 @@ def point_to_point(rng: np.random.Generator, robot: Robot) -> References:
 
 
 def slow_and_short(rng: np.random.Generator, robot: Robot) -> References:
-    """Return short logs of slow sines, with weak chirps on some."""
+    """Return short logs of slow sines, some with weak chirps."""
     time, axes = _times(robot, _SHORT_S), robot.n_axes
     out: References = {}
     for k in range(1, 5):
@@ -66,7 +66,7 @@ MOTIONS: Mapping[str, Callable[[np.random.Generator, Robot], References]] = {
     "moves": point_to_point,
     "slow_and_short": slow_and_short,
 }
-"""By name."""
+"""Plans by name."""
 
 
 def _times(robot: Robot, seconds: float) -> Array:
@@ -87,7 +87,7 @@ def _slow_sine(rng: np.random.Generator, time: Array, axes: int) -> Array:
 
 
 def _chirp(rng: np.random.Generator, time: Array, axes: int) -> Array:
-    """Return weak swings from 1 to 20 Hz, axes apart in time and phase."""
+    """Return weak chirps from 1 to 20 Hz, shifted in time and phase between axes."""
     rate = (20.0 - 1.0) / _SHORT_S
     phases = 2 * np.pi * (1.0 * time + 0.5 * rate * time**2)
     wave = np.sin(phases[:, None] + rng.uniform(0, 2 * np.pi, axes))
@@ -95,7 +95,7 @@ def _chirp(rng: np.random.Generator, time: Array, axes: int) -> Array:
 
 
 def _multisine(rng: np.random.Generator, time: Array, loud: Array, share: float = 1.0) -> Array:
-    """Return random-phase multisines from 1 to 40 Hz on square waves that keep the motors turning."""
+    """Return random-phase multisines from 1 to 40 Hz on square waves, which keep the motors turning."""
     lines = np.arange(1.0, 40.0, 1.0 / _SECONDS)
     out = np.empty((len(time), len(loud)))
     square = np.tanh(20 * np.sin(2 * np.pi * time / 5.0))
@@ -109,7 +109,8 @@ def _multisine(rng: np.random.Generator, time: Array, loud: Array, share: float 
 def _cosines(time: Array, frequency_hz: Array, phases: Array) -> Array:
     """Return the sum of cosines (n,) at equally spaced times from zero.
 
-    By exponentials of the start of each block times those within a block: 2 sqrt(n) a frequency, not n cosines.
+    A product of two exponentials, one per block and one within a block, needs 2 sqrt(n) terms per frequency,
+    not n.
     """
     n, step = len(time), time[1] - time[0]
     length = int(np.sqrt(n)) + 1

@@ -1,4 +1,4 @@
-"""Closed loops on a machine that MuJoCo simulates: its own steps, its own constraint solver."""
+"""Closed loops of a machine in MuJoCo, with MuJoCo's own integrator and constraint solver."""
 
 from __future__ import annotations
 
@@ -23,17 +23,18 @@ except ImportError as error:
 
 Array = NDArray[np.float64]
 
-# At rest before a log begins, held by the controller.
+# Time at rest under the controller before a log begins.
 _SETTLING_S = 4.0
 
 
 def run(
     machine: Machine, references: Sequence[Array], noises: Sequence[Array]
 ) -> list[tuple[Array, Array]]:
-    """Return reported torque [Nm] and measured motor angle [rad] along references [rad/s], (n, n_axes) each.
+    """Return reported torque [Nm] and measured motor angle [rad] of each run, both (n, n_axes).
 
-    ``noises`` [rad], as references, are added to the angle that is logged and fed back. The machine stands
-    still under its controller before. Raises InputError where it does not stay stable.
+    ``references`` [rad/s] and ``noises`` [rad] are (n, n_axes). The noise is added to the angle that is
+    logged and fed back. The machine stands still under its controller first. Raises InputError if the loop
+    becomes unstable.
     """
     loop = _Loop(machine)
     loop.settle()
@@ -67,38 +68,38 @@ class _Loop:
             law.begin(self.step_s)
         self.data.qpos[self.joints] = robot.operating_point
         weight = self._weight()
-        # Gears give way to it, so that the joints stand at the operating point.
+        # The gears deflect under weight; the motors turn until the joints stand at the operating point.
         deflection = weight / self.stiffness
         along = machine.along()
         self.data.qpos[: self.n] = np.linalg.solve(along, robot.operating_point + deflection)
         angle = self.data.qpos[: self.n].copy()
         self.controller = Controller(machine, angle, weight @ along)
         self.time_s = 0.0
-        # Views of what the engine computes with.
+        # Views, because the engine overwrites these arrays in place.
         data = self.data
         self.command, self.applied = data.ctrl, data.qfrc_applied
         self.angle, self.speed = data.qpos, data.qvel
 
     def _weight(self) -> Array:
-        """Return the torques that hold the joints where they are."""
+        """Return the torques that hold the joints in their pose."""
         mujoco.mj_forward(self.model, self.data)
         return np.asarray(self.data.qfrc_bias[self.joints])
 
     def settle(self) -> None:
-        """Stand still under the controller until nothing moves; logs begin from there."""
+        """Stand still under the controller until nothing moves; logs start from this state."""
         still = np.zeros((round(_SETTLING_S / self.sample_s), self.n))
         self.follow(still, still)
         self.rest = copy.copy(self.data), copy.deepcopy((self.laws, self.controller))
 
     def begin_log(self) -> None:
-        """Be at rest as settled, and count time from here."""
+        """Return to the settled state and set the time to zero."""
         data, memories = self.rest
         mujoco.mj_copyData(self.data, self.model, data)
         self.laws, self.controller = copy.deepcopy(memories)
         self.time_s = 0.0
 
     def follow(self, reference: Array, noise: Array) -> tuple[Array, Array]:
-        """Return reported torque and measured angle along a reference."""
+        """Return reported torque [Nm] and measured angle [rad]; raises InputError if unstable."""
         torque, angle = np.empty_like(reference), np.empty_like(reference)
         for k, wanted in enumerate(reference):
             measured = self.angle[: self.n] + noise[k]

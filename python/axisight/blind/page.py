@@ -12,7 +12,7 @@ _WORDS = {"none": "none", "unknown": "unknown", "nothing": "nothing"}
 
 
 def render_score(name: str, score: dict[str, Any]) -> str:
-    """Return what `axisight.blind.summary` says as an HTML page; the same score gives the same text."""
+    """Return a score (`axisight.blind.summary`) as an HTML page; equal scores give equal text."""
     named = sorted({n for row in score["confusion"].values() for n in row})
     page = {
         "name": name,
@@ -63,7 +63,7 @@ def render_score(name: str, score: dict[str, Any]) -> str:
 
 
 def _carried_over(found: dict[str, Any] | None) -> list[dict[str, str]]:
-    """Return what a temperature of one engine does on the others, a row each."""
+    """Return a row per engine: losses there with the temperature and priors of the fitted engine."""
     if found is None:
         return []
     rows = {
@@ -79,7 +79,7 @@ def _carried_over(found: dict[str, Any] | None) -> list[dict[str, str]]:
 
 
 def _setting(key: str, values: dict[str, Any]) -> dict[str, Any]:
-    """Return figures as rows, the engines (arms, motions) as columns."""
+    """Return figures as rows, with engines, arms or motions as columns."""
     names = list(next(iter(values.values()))["figures"])
     return {
         "title": f"By {key}",

@@ -1,6 +1,7 @@
-"""Closed loops on a machine whose rigid bodies Pinocchio moves; all runs of a machine at once.
+"""Closed loops of a machine whose rigid bodies Pinocchio computes; all runs at once.
 
-Motors, gears and formulas are ours, in arrays over the runs; Runge-Kutta steps of order four.
+This module simulates motors, gears and formulas, in arrays over the runs, with Runge-Kutta steps of order
+four.
 """
 
 from __future__ import annotations
@@ -26,20 +27,20 @@ except ImportError as error:
 
 Array = NDArray[np.float64]
 
-# At rest before a log begins, held by the controller.
+# Time at rest under the controller before a log begins.
 _SETTLING_S = 1.0
 STEPS_PER_SAMPLE = 2
-"""Runge-Kutta steps."""
+"""Runge-Kutta steps per sample."""
 
 
 def run(
     machine: Machine, references: Sequence[Array], noises: Sequence[Array]
 ) -> list[tuple[Array, Array]]:
-    """Return reported torque [Nm] and measured motor angle [rad] along references [rad/s], (n, n_axes) each.
+    """Return reported torque [Nm] and measured motor angle [rad] of each run, both (n, n_axes).
 
-    ``noises`` [rad], as references, are added to the angle that is logged and fed back. The machine stands
-    still under its controller before. Raises InputError where it does not stay stable, or where references
-    differ in length.
+    ``references`` [rad/s] and ``noises`` [rad] are (n, n_axes). The noise is added to the angle that is
+    logged and fed back. The machine stands still under its controller first. Raises InputError if the loop
+    becomes unstable or if references differ in length.
     """
     if len({x.shape for x in (*references, *noises)}) != 1:
         raise InputError("references: expected runs of one length")
@@ -55,7 +56,7 @@ def run(
 
 @dataclass
 class _Chain:
-    """Joints of the arm as Pinocchio takes them, springs of the base first."""
+    """Joints of the arm for Pinocchio, springs of the base first."""
 
     model: pinocchio.Model
     stiffness: list[float] = field(default_factory=list)
@@ -63,7 +64,7 @@ class _Chain:
     last: int = 0
 
     def add(self, name: str, axis: Array, origin: Array, *, slides: bool = False) -> None:
-        """Add a joint to the end, with no spring of its own."""
+        """Add a joint without spring at the end."""
         kind = (
             pinocchio.JointModelPrismaticUnaligned
             if slides
@@ -130,7 +131,7 @@ class _Loop:
         self.inertia = np.array([d.motor_inertia * (1 + x.armature) for _, d, x in gears if d])
         self.viscous = np.array([d.viscous_friction * (1 + x.viscous) for _, d, x in gears if d])
         self.gain = np.array([1 + x.gear for x in own])
-        # For all runs in one call.
+        # A pool evaluates all runs in one call.
         self.pool = pinocchio.ModelPool(self.model, 1)
         self.zero = np.zeros(self.model.nq)
         self.zero[self.joints] = [x.zero_rad for x in own]
@@ -153,7 +154,7 @@ class _Loop:
             formula.begin(at, self.step_s)
 
     def _balanced(self, at: Array) -> tuple[Array, Array]:
-        """Return the joint angles at rest with driven joints as given, and the torques that hold them."""
+        """Return the joint angles at rest for given driven joints, and the torques that hold them."""
         joint = np.zeros(self.model.nq)
         joint[self.joints] = at
         free = self.springs > 0
@@ -185,10 +186,10 @@ class _Loop:
         return torque, angle
 
     def _step(self, command: Array) -> None:
-        """Take one Runge-Kutta step of order four with the drives' mean torque over it."""
+        """Take one Runge-Kutta step of order four with the drives' mean torque."""
         drive = command.copy()
         for axis, formula in self.formulas:
-            # A drive may keep what it was told: its own copy.
+            # A copy, because a drive may keep the array.
             drive[:, axis] = formula.command(drive[:, axis].copy())
         drive *= self.gain
         h, t, state = self.step_s, self.time_s, self.state
@@ -207,7 +208,7 @@ class _Loop:
         return state[:, :n], state[:, n:half], state[:, half : half + n], state[:, half + n :]
 
     def _places(self, state: Array, time_s: float) -> Iterator[tuple[int, Formula, Place]]:
-        """Yield every formula with its axis and where that is."""
+        """Yield every formula with its axis and the axis's state."""
         motor, joint, motor_speed, joint_speed = self._parts(state)
         for axis, formula in self.formulas:
             ratio, k = float(self.ratio[axis]), self.joints[axis]
@@ -217,7 +218,7 @@ class _Loop:
             yield axis, formula, Place(time_s, phi, speed, deflection, rate, ratio, *gear)
 
     def _rates(self, state: Array, drive: Array, time_s: float) -> Array:
-        """Return the rates of a state under torques of the drives."""
+        """Return the time derivative of a state under drive torques."""
         motor, joint, motor_speed, joint_speed = self._parts(state)
         deflection = motor @ self.along.T - joint[:, self.joints]
         rate = motor_speed @ self.along.T - joint_speed[:, self.joints]
@@ -235,7 +236,7 @@ class _Loop:
         _, _, motor_rate, joint_rate = self._parts(rates)
         motor_rate[:] = on_motor / self.inertia
         turned, speed = joint + self.zero, np.ascontiguousarray(joint_speed)
-        # It takes a column for every run.
+        # Pinocchio takes one column per run.
         solved = np.empty_like(turned)
         pinocchio.abaInParallel(1, self.pool, turned.T, speed.T, on_joint.T, solved.T)
         joint_rate[:] = solved

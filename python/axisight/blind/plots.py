@@ -1,4 +1,4 @@
-"""Figures of a benchmark's score: what was named for what, and how far probabilities can be believed."""
+"""Figures of a benchmark's score: confusion matrix and calibration."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from axisight.palette import AFTER, cell_colors
 
 
 def plot_confusion(score: Mapping[str, Any]) -> Figure:
-    """Plot the confusion matrix of a score (`summary`): rows are what was withheld, columns what was named first.
+    """Plot the confusion matrix of a score (`summary`): rows are truths, columns the first named causes.
 
-    A cell has the share of its row as its colour and the count in it. Returns a Figure.
+    The colour of a cell shows the share of its row, its number the count. Returns a Figure.
     """
     rows: Mapping[str, Mapping[str, int]] = score["confusion"]
     truths = list(rows)
-    # What is right stands on the diagonal; what is no truth behind it.
+    # Truths first, so that right answers stand on the diagonal.
     others = sorted({n for row in rows.values() for n in row} - set(truths))
     names = [*truths, *others]
     figure = Figure(
@@ -46,10 +46,10 @@ def plot_confusion(score: Mapping[str, Any]) -> Figure:
 
 
 def plot_calibration(score: Mapping[str, Any]) -> Figure:
-    """Plot how often causes were right against how probable they were said to be; returns a Figure.
+    """Plot how often causes were right over their stated probability; returns a Figure.
 
-    A dot is a tenth of the probabilities, as large as it has causes, with Wilson's interval at 95 %; on
-    the line probabilities are what they say.
+    Each dot is a tenth of the probability range, with an area for its count and Wilson's interval at 95 %.
+    Dots on the line are calibrated.
     """
     figure = Figure(figsize=(4.5, 4.2), layout="constrained")
     axes = figure.subplots()

@@ -1,4 +1,4 @@
-"""Work shared by processes, with progress."""
+"""Work in parallel processes, with progress."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ B = TypeVar("B")
 def shared_out(
     work: Callable[[A], B], items: Sequence[A], workers: int, label: str, progress: Progress
 ) -> list[B]:
-    """Return what ``work`` makes of every item, in their order; it has to be a plain function."""
+    """Return ``work(item)`` for every item, in order; ``work`` must be a module-level function."""
     made: dict[int, B] = {}
     progress(label, 0, len(items))
     for place, result in each_done(work, items, workers):

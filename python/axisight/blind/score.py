@@ -1,4 +1,4 @@
-"""Verdicts against truths: how often a cause was named, missed or invented, and how sure it was."""
+"""Verdicts against truths: how often a cause was named, missed or invented, and with what confidence."""
 
 from __future__ import annotations
 
@@ -18,30 +18,31 @@ from axisight.errors import InputError
 from axisight.gap.ranking.twins import TWIN_SHARE, twins_of
 
 SEVERE = 3.0
-"""Change of the torque over its noise from which an effect counts as there to be found."""
+"""Rms torque change over noise above which an effect counts as severe, that is as detectable."""
 SETTING = ("engine", "arm", "motions", "references")
-"""What a case is drawn with, as its truth says."""
-# What truths before it was drawn do not say.
+"""Properties of a case's draw, as named in its truth."""
+# For truths that do not state every property.
 _ALWAYS = {"references": "logged"}
-# Of a gap's reduction, that count as right.
+# Error of the gap's reduction that still counts as right.
 _POINTS = 0.05
-# Alternatives this likely belong to what a verdict allows.
+# Alternatives of at least this probability count as allowed.
 _ALTERNATIVE = 0.05
 
 
 @dataclass(frozen=True)
 class Judged:
-    """One verdict beside its truth.
+    """One verdict and its truth.
 
-    Labels are ``effect@axis``. ``allowed``: causes, equivalents and likely alternatives;
-    ``where``: the axis on which the gap mainly lies; ``n_axes``: how many the arm has, 0
-    where that is not known. ``ratios``: named value over true value of the
-    parameters that both state; ``covered``: whether their intervals hold the true value. ``setting``:
-    names of engine, arm and motions, and whether references were logged. ``missed``: by label of
-    effects of the library that are not named, their size over the detection limit that the verdict
-    states for it; 0 where it says that no size would show, NaN where it says nothing. ``reduction``:
-    `gap_reduction` of the first cause; of the true cause of a gap, where it is the only one, all of
-    the gap goes.
+    - Labels are ``effect@axis``.
+    - ``allowed``: causes, equivalents and likely alternatives.
+    - ``where``: the axis with most of the gap; ``n_axes``: axes of the arm, 0 if unknown.
+    - ``ratios``: named over true value of the parameters that both state; ``covered``: whether their
+      intervals contain the true value.
+    - ``setting``: engine, arm and motions by name, and whether references were logged.
+    - ``missed``: true size over stated detection limit, for each library effect that is not named; 0 if the
+      verdict says that no size would show, NaN if it states no limit.
+    - ``reduction``: `gap_reduction` of the first cause. A true cause that is the only one removes the whole
+      gap.
     """
 
     name: str
@@ -62,7 +63,7 @@ class Judged:
 
     @property
     def kind(self) -> str:
-        """``nothing``, ``unknown`` (not in the library), ``single`` or ``pair``."""
+        """``nothing``, ``unknown`` (outside the library), ``single`` or ``pair``."""
         if not self.truth:
             return "nothing"
         if not self.in_library:
@@ -71,12 +72,12 @@ class Judged:
 
     @property
     def severe(self) -> bool:
-        """Whether it is there to be found."""
+        """Whether the effect is large enough to be found."""
         return self.severity >= SEVERE
 
     @property
     def right(self) -> bool:
-        """Whether the verdict says what is true, and nothing else."""
+        """Whether the verdict states the truth and nothing else."""
         if self.kind in ("nothing", "unknown"):
             wanted = "none" if self.kind == "nothing" else "unknown"
             return self.verdict == wanted and not self.named
@@ -85,20 +86,20 @@ class Judged:
 
 @dataclass(frozen=True)
 class Share:
-    """So many of so many, with Wilson's interval at 95 %."""
+    """A count of a total, with Wilson's interval at 95 %."""
 
     hits: int
     of: int
 
     def interval(self) -> tuple[float, float]:
-        """Return the interval (Wilson 1927); all of it where nothing was tried."""
+        """Return the interval (Wilson 1927); 0 to 1 for a total of zero."""
         if self.of == 0:
             return 0.0, 1.0
         found = scipy.stats.binomtest(self.hits, self.of).proportion_ci(method="wilson")
         return float(found.low), float(found.high)
 
     def __str__(self) -> str:
-        """Return the share in words of a table."""
+        """Return the share as text for a table."""
         if self.of == 0:
             return "-"
         low, high = self.interval()
@@ -106,10 +107,10 @@ class Share:
 
 
 def judged_cases(cases: Path, truths: Path, verdicts: Path) -> list[Judged]:
-    """Return every verdict beside its truth.
+    """Return every verdict with its truth.
 
-    Raises InputError for a truth that is not the one its case was sealed with, or that is not there, for
-    a damaged verdict, and where there is no verdict at all.
+    ``cases``, ``truths`` and ``verdicts`` are folders. Raises InputError for a missing truth, for one that
+    differs from the truth its case was sealed with, for a damaged verdict, and for a folder without verdicts.
     """
     out = []
     for path in sorted(verdicts.glob("*.json")):
@@ -123,7 +124,7 @@ def judged_cases(cases: Path, truths: Path, verdicts: Path) -> list[Judged]:
             out.append(_judged(path.stem, truth, verdict))
         except InputError:
             raise
-        except Exception as error:  # what is damaged but JSON lacks anything, or has it as anything
+        except Exception as error:  # a damaged file may lack any field or hold any type
             raise InputError(
                 f"{path}: expected a verdict as axisight writes it, and its truth, got one that is damaged "
                 f"({short(repr(error))})"
@@ -155,7 +156,7 @@ def _label(entry: dict[str, Any]) -> str:
 
 
 def sizes(true: dict[str, float]) -> dict[str, float]:
-    """Return what is compared of a truth: parameters, and amplitudes by the order of their wave."""
+    """Return the comparable values of a truth: parameters, and wave amplitudes by order."""
     out = {k: v for k, v in true.items() if not k.startswith(("order", "amplitude"))}
     for key, order in true.items():
         if key.startswith("order"):
@@ -165,7 +166,7 @@ def sizes(true: dict[str, float]) -> dict[str, float]:
 
 
 def comparable(found: dict[str, Any]) -> dict[str, tuple[float, float, float]]:
-    """Return value and interval of what was found, cosine and sine of an order as its amplitude."""
+    """Return value and interval of each found parameter; cosine and sine of one order become an amplitude."""
     out = {k: (v["value"], *v["ci95"]) for k, v in found.items()}
     for key, order in found.items():
         if not key.startswith("order"):
@@ -192,7 +193,7 @@ _FAILED: dict[str, Any] = {
 
 
 def _as_named(effect: dict[str, Any], named: set[str], n_axes: int) -> dict[str, Any]:
-    """Return a withheld effect as its twin where that is named: their logs are the same."""
+    """Return a withheld effect under its twin's name if the verdict names the twin: same logs."""
     kind = effect["effect"]
     twins = twins_of(kind, n_axes) if kind in effect_table() else ()
     as_twins = [{**effect, "effect": name} for name in twins]
@@ -213,13 +214,13 @@ def _missed(
     limits: Sequence[dict[str, Any]],
     n_axes: int,
 ) -> dict[str, float]:
-    """Return what is not named, with its size over the detection limit said of it."""
+    """Return the effects that are not named, with their size over the stated detection limit."""
     stated = {_label(limit): limit for limit in limits}
     out = {}
     for effect in withheld:
         label, kind = _label(effect), effect["effect"]
         if label not in named and kind in effect_table():
-            # A limit of one of twins is that of the other.
+            # A twin's limit is that of the effect too.
             twins = ({**effect, "effect": name} for name in (kind, *twins_of(kind, n_axes)))
             limit = next((stated[_label(t)] for t in twins if _label(t) in stated), None)
             out[label] = float("nan") if limit is None else _over(effect["parameters"], limit)
@@ -227,9 +228,9 @@ def _missed(
 
 
 def _over(true: dict[str, float], limit: dict[str, Any]) -> float:
-    """Return a size over its limit; of waves, which a limit states by cosine or sine, of the largest.
+    """Return a size over its limit; for waves, whose limits are per cosine or sine, over the largest.
 
-    A size that another formula states by another name comes first.
+    A size under another formula's name comes first.
     """
     waves = [v for k, v in true.items() if k.startswith("amplitude")]
     size = true.get(limit["parameter"], max(waves, default=next(iter(true.values()))))
@@ -237,14 +238,14 @@ def _over(true: dict[str, float], limit: dict[str, Any]) -> float:
 
 
 def _said(cause: dict[str, Any], n_axes: int) -> float:
-    """Return the probability said of a cause or a twin of it: they count as one another."""
+    """Return the stated probability of a cause or of its twin: twins count as one."""
     twins = twins_of(cause["effect"], n_axes)
     return float(cause["probability"] / (1 - TWIN_SHARE * len(twins)))
 
 
 def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged:
     if "error" in verdict:
-        # What could not be diagnosed counts, and is not right.
+        # A failed diagnosis counts, as wrong.
         verdict = _FAILED
     causes, n_axes = verdict["causes"], len(truth["severity"])
     withheld = [_as_named(e, {_label(c) for c in causes}, n_axes) for e in truth["effects"]]
@@ -259,7 +260,7 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
             if key in found and value:
                 here, low, high = found[key]
                 ratios.append(here / value)
-                # A verdict may state no interval: that holds nothing.
+                # Without a stated interval the value is not covered.
                 stated = low is not None and high is not None
                 covered.append(stated and low <= value <= high)
     return Judged(
@@ -282,7 +283,7 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
 
 
 def figures(judged: Sequence[Judged]) -> dict[str, Share]:
-    """Return the shares of a benchmark by what they count."""
+    """Return the shares of a benchmark, by the name of the figure."""
 
     def share(among: Sequence[Judged], good: Sequence[bool]) -> Share:
         return Share(sum(good), len(among))
@@ -325,7 +326,7 @@ def figures(judged: Sequence[Judged]) -> dict[str, Share]:
 
 
 def _with_a_limit(judged: Judged) -> int:
-    """Return how many effects were named, or missed with a limit said of them."""
+    """Return how many effects the verdict named, or missed with a stated limit."""
     said = sum(not np.isnan(over) for over in judged.missed.values())
     return len(judged.truth) - len(judged.missed) + said
 
@@ -334,6 +335,6 @@ def _axis_named(judged: Judged) -> bool:
     axis = int(judged.truth[0].partition("@")[2])
     if not judged.named:
         return axis in judged.where
-    # What concerns an arm of one axis concerns that.
+    # An arm with one axis has only effects of that axis.
     said = judged.named[0].partition("@")[2] or ("1" if judged.n_axes == 1 else "")
     return said == str(axis)

@@ -1,4 +1,4 @@
-"""All that a benchmark says, as plain values: for files, pages and other programs."""
+"""A benchmark's score as plain values: for files, pages and other programs."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from axisight.blind.score import SETTING, Judged, Share, figures
 from axisight.effects import effect_info, effect_table
 
 SCHEMA = "axisight.score/1"
-# Change of the torque over its noise, by which a detection curve is cut.
+# Rms torque change over noise: bin edges of the detection curve.
 _SEVERITIES = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0, float("inf"))
 
 
 def summary(judged: Sequence[Judged]) -> dict[str, Any]:
-    """Return figures, classes, confusion, calibration, a curve of detection and what is not right.
+    """Return figures, classes, confusion, calibration, detection curve and wrong cases of a benchmark.
 
-    ``settings``: the figures by what cases are drawn with. ``confusion``: of single effects and of
-    nothing withheld, how often each was named as what; a verdict without a cause counts by its word.
-    Twins count as one another. Shares have Wilson's interval.
+    ``settings``: figures by engine, arm, motions and references. ``confusion``: counts of the first named
+    cause, for cases with one effect or none; a verdict without a cause counts by its word. Twins count as
+    one. Shares have Wilson's interval.
     """
     single = [j for j in judged if j.kind == "single"]
     off = [abs(r - 1) for j in judged for r in j.ratios]
@@ -81,7 +81,7 @@ def _family(label: str) -> str:
 
 
 def _by_class(single: Sequence[Judged], of: Callable[[str], str]) -> dict[str, Any]:
-    """Return by class how often the effect was first, of all and of those that are there to be found."""
+    """Return by class how often the effect came first, among all cases and among severe ones."""
     out = {}
     for name in sorted({of(j.truth[0]) for j in single}):
         mine = [j for j in single if of(j.truth[0]) == name]
@@ -94,7 +94,7 @@ def _by_class(single: Sequence[Judged], of: Callable[[str], str]) -> dict[str, A
 
 
 def _by_setting(judged: Sequence[Judged], key: str) -> dict[str, Any]:
-    """Return the figures of the cases of every engine, arm or plan of motions, say."""
+    """Return the figures by one property of the cases, such as engine or arm."""
     out = {}
     for value in sorted({j.setting[key] for j in judged}):
         mine = [j for j in judged if j.setting[key] == value]
@@ -118,7 +118,7 @@ def _confusion(judged: Sequence[Judged]) -> dict[str, dict[str, int]]:
 
 
 def _detection(single: Sequence[Judged]) -> list[dict[str, Any]]:
-    """Return by severity how often a single effect of the library was named first."""
+    """Return by severity how often a single library effect came first."""
     out = []
     for low, high in itertools.pairwise(_SEVERITIES):
         mine = [j for j in single if low <= j.severity < high]

@@ -7,7 +7,7 @@ from typing import Any
 
 from axisight.blind.score import Share
 
-# Figures told apart by what cases are drawn with, under short names.
+# Short names of the figures by setting.
 _BRIEF = {
     "effect first, severity 3 and more": "effect first",
     "axis": "axis",
@@ -20,7 +20,7 @@ _BRIEF = {
 
 
 def markdown(score: Mapping[str, Any]) -> str:
-    """Return what `axisight.blind.summary` says: figures, parts of them, every case that is not right."""
+    """Return a score (`axisight.blind.summary`) as Markdown: figures, their parts and every wrong case."""
     figures = [[name, _words(share)] for name, share in score["figures"].items()]
     error, off = score["calibration"]["error"], score["parameters_median_error"]
     figures += [
@@ -65,7 +65,7 @@ def markdown(score: Mapping[str, Any]) -> str:
 
 
 def _carried_over(found: Mapping[str, Any] | None) -> list[list[str]]:
-    """Return what a temperature of one engine does on the others, a row each."""
+    """Return a row per engine: losses there with the temperature and priors of the fitted engine."""
     if found is None:
         return []
     own, hot = found["fitted_on"], found["temperature"]

@@ -1,9 +1,14 @@
-"""What is withheld from simulators: effects by name, the ranges they are drawn from, their laws.
+"""Withheld effects by name: the ranges from which their sizes are drawn, and their laws.
 
-Ranges are those of industrial robots: of the three-axis preset friction of a tenth to a half of the rated
-torque (Armstrong-Helouvry 1991), lost motion of harmonic and cycloidal gears of one arc minute and less,
-transmission errors of half an arc minute, ripple of a few per cent of the rated torque, delays of one
-to three samples; of other arms the same in the units of their motors and gears (`Scene`).
+Ranges are those of industrial robots. On the three-axis preset:
+
+- friction of 0.1 to 0.5 of the rated torque (Armstrong-Helouvry 1991),
+- lost motion of harmonic and cycloidal gears up to 1 arc minute,
+- transmission errors of 0.5 arc minutes,
+- ripple of a few per cent of the rated torque,
+- delays of 1 to 3 samples.
+
+On other arms the ranges scale with motors and gears (`Scene`).
 """
 
 from __future__ import annotations
@@ -29,7 +34,7 @@ from axisight.blind.scene import (
     unloaded,
 )
 
-# What a radian of play of turning axes is on a slide, for the way before friction slips [m].
+# A slide's displacement before slip [m] per radian on revolute axes.
 _SLIDE_M = 0.25
 
 
@@ -41,21 +46,21 @@ def _coulomb(rng: Rng, scene: Scene, axis: int) -> Drawn:
 def _stribeck(rng: Rng, scene: Scene, axis: int) -> Drawn:
     dry, speed = between(rng, 0.25, 0.6) * scene.torque(axis), between(rng, 2.0, 8.0)
     excess = dry * float(rng.uniform(0.5, 1.3))
-    # The excess falls exponentially, in the library like a bell: the two state it in other numbers.
+    # Exponential excess, a bell curve in the library: their numbers do not compare.
     values = {"coulomb_nm": dry, "exponential_excess_nm": excess, "decay_speed_rad_s": speed}
     law = laws.ExponentialStribeck(dry, dry + excess, speed, 0.05)
     return Drawn("stribeck_friction", axis, values, laws=[law])
 
 
 BEHIND = "arm_share"
-"""Parameter of a friction that acts behind the gear."""
+"""Parameter for friction that acts behind the gear."""
 
-# Of so many draws of dry friction one does.
+# One of so many draws of dry friction acts behind the gear.
 _BEHIND_ONE_IN = 3
 
 
 def behind(kind: Kind, moved: Callable[[Drawn], Sequence[object]]) -> Kind:
-    """Return a kind of friction that the arm feels in some draws, by the laws that ``moved`` makes of one."""
+    """Return a kind of friction that some draws put behind the gear, with the laws that ``moved`` returns."""
 
     def draw(rng: Rng, scene: Scene, axis: int) -> Drawn:
         drawn = kind.draw(rng, scene, axis)
@@ -68,7 +73,7 @@ def behind(kind: Kind, moved: Callable[[Drawn], Sequence[object]]) -> Kind:
 
 
 def _behind(drawn: Drawn) -> list[friction_laws.BehindGear]:
-    """Return the laws of a friction behind the gear; what MuJoCo makes by itself is one with a corner."""
+    """Return the laws of a friction behind the gear; MuJoCo's native friction becomes a law with a corner."""
     size = drawn.native.friction_nm
     there = [laws.OneSidedFriction(size, size, 0.05)] if size else drawn.laws
     return [friction_laws.BehindGear(law) for law in there if isinstance(law, laws.Law)]
@@ -77,16 +82,16 @@ def _behind(drawn: Drawn) -> list[friction_laws.BehindGear]:
 def _bristles(rng: Rng, scene: Scene, axis: int) -> Drawn:
     size = between(rng, 0.2, 0.7) * scene.torque(axis)
     way = yielding(rng, scene, axis)
-    # The way is another law's.
+    # The displacement belongs to another law than the library's, hence another name.
     values = {"coulomb_nm": size, "elastoplastic_rad": way}
     law = friction_laws.ElastoPlastic(size, way)
     return Drawn("presliding_friction", axis, values, laws=[law])
 
 
 def yielding(rng: Rng, scene: Scene, axis: int) -> float:
-    """Draw the angle of a motor [rad] before friction slips: of a gear's play, as the motor turns it.
+    """Draw the motor angle [rad] before friction slips, of the size of a gear's play.
 
-    On a slide over 40 to 150 micrometres: what slips much sooner is dry friction, whoever writes it.
+    On a slide this is 40 to 150 micrometres. Friction that slips much earlier is dry friction in any formula.
     """
     ratio = abs(float(scene.robot.gear_ratio[axis - 1]))
     unit = _SLIDE_M if scene.robot.axis_is_prismatic[axis - 1] else 1.0
@@ -100,7 +105,7 @@ def _uneven(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 def uneven(rng: Rng, scene: Scene, axis: int) -> dict[str, float]:
-    """Draw dry friction on a motor [Nm], by how much of it it changes, and over which angle of the joint [rad]."""
+    """Draw uneven dry friction: mean [Nm, motor side], relative change [1], waves [1/rad], phase [rad]."""
     size, travel = between(rng, 0.3, 0.8) * scene.torque(axis), scene.travel(axis)
     return {
         "mean_nm": size,
@@ -111,7 +116,7 @@ def uneven(rng: Rng, scene: Scene, axis: int) -> dict[str, float]:
 
 
 def on_joint(scene: Scene, axis: int, values: Mapping[str, float]) -> dict[str, float]:
-    """Return what laws of uneven friction take."""
+    """Return the arguments of an uneven friction law, on the joint side."""
     ratio = abs(float(scene.robot.gear_ratio[axis - 1]))
     size, share, waves, phase = values.values()
     return {"dry_nm": size / ratio, "share": share, "waves": waves, "phase": phase}
@@ -139,7 +144,7 @@ def _asymmetric(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 def _drag(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    # As much at the largest speed as the friction that the simulator has there, about.
+    # About as much as the simulator's friction at the largest speed.
     share = between(rng, 0.4, 1.5) * scene.of_joint(axis, "viscous_friction")
     drag = share / scene.speed(axis)
     return Drawn("quadratic_drag", axis, {"drag_nm_s2_rad2": drag}, laws=[laws.Drag(drag)])
@@ -147,7 +152,7 @@ def _drag(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 def _balancer(rng: Rng, scene: Scene, axis: int) -> Drawn:
     size = sign(rng) * between(rng, 0.05, 0.3) * scene.rated_nm(axis)
-    # Most stand upright where their axis does.
+    # Most balancers are upright at the zero of their axis.
     angle = float(rng.choice([0.0, rng.uniform(-0.5, 0.5)]))
     values = {"sine_nm": size * float(np.cos(angle)), "cosine_nm": size * float(np.sin(angle))}
     law = joint_laws.Balancer(values["sine_nm"], values["cosine_nm"])
@@ -175,7 +180,7 @@ def _swinging(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 def _tilt(rng: Rng, _scene: Scene, _axis: int) -> Drawn:
-    # One to three degrees: of a plate that was not levelled.
+    # One to three degrees, as of a base plate that nobody levelled.
     about = [sign(rng) * between(rng, 0.015, 0.05) for _ in range(2)]
     values = {"about_x_rad": about[0], "about_y_rad": about[1]}
     return Drawn("base_tilt", None, values, ends=Ends(tilted_rad=(about[0], about[1])))
@@ -207,13 +212,13 @@ def _lost_motion(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 def _sag(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    # A supply that gives a tenth to a half less at the largest power.
+    # The supply drops by 0.1 to 0.5 at the largest power.
     share = between(rng, 0.1, 0.5) / (scene.speed(axis) * float(scene.largest_nm[axis - 1]))
     return Drawn("power_supply_sag", axis, {"sag_1_w": share}, laws=[laws.Sag(share)])
 
 
 def _eccentric(rng: Rng, _scene: Scene, axis: int) -> Drawn:
-    # A tenth of a millimetre to half of one, on a disc of 25 mm.
+    # 0.1 to 0.5 mm on a disc of 25 mm.
     run_out, phase = between(rng, 4e-3, 2e-2), float(rng.uniform(0, 2 * np.pi))
     law = laws.EccentricDisc(run_out, phase)
     values = {"cosine_rad": run_out * np.sin(phase), "sine_rad": run_out * np.cos(phase)}
@@ -231,7 +236,7 @@ def _coupled(rng: Rng, _scene: Scene, axis: int) -> Drawn:
 
 
 def _fast_clock(rng: Rng, _scene: Scene, _axis: int) -> Drawn:
-    # Of quartz that was never set right, to that of a busy computer.
+    # From an uncalibrated quartz to a busy computer's clock.
     fast = sign(rng) * between(rng, 3e-5, 1e-3)
     return Drawn("clock_drift", None, {"relative_rate": fast}, fast=fast)
 
@@ -256,7 +261,7 @@ def _hysteresis(rng: Rng, scene: Scene, axis: int) -> Drawn:
     stiff = share * scene.stiffness(axis)
     slips = slip * np.array([0.4, 0.8, 1.2, 1.6])
     law = laws.MaxwellSlip([stiff / 4] * 4, list(slips))
-    # What slips was part of the spring.
+    # The slipping part comes out of the spring.
     native = Native(spring=-share)
     return Drawn("gear_hysteresis", axis, {"share": share, "deflection_rad": slip}, native, [law])
 
@@ -265,7 +270,7 @@ def _transmission(rng: Rng, scene: Scene, axis: int) -> Drawn:
     size = between(rng, 0.7e-4, 2e-4) * scene.play(axis)
     phase = float(rng.uniform(0, 2 * np.pi))
     conserves = bool(rng.integers(2))
-    # Twice a turn of the motor in strain wave gears; others have other teeth.
+    # Strain wave gears have two waves per motor turn; other gears differ.
     order = float(rng.choice([1.0, 2.0, 2.0, 3.0]))
     law = laws.GearWave(scene.stiffness(axis), order, size, phase, conserves)
     return Drawn("transmission_error", axis, {"order": order, "amplitude_rad": size}, laws=[law])
@@ -297,7 +302,7 @@ def _resolver_ripple(rng: Rng, _scene: Scene, axis: int) -> Drawn:
 
 
 def _delay(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    # By whole steps of the engine: one to three samples.
+    # Whole engine steps: one to three samples.
     delay = float(rng.integers(2, 7)) * scene.robot.sample_time_s / STEPS_PER_SAMPLE
     return Drawn("input_delay", axis, {"delay_s": delay}, laws=[laws.Delay(delay)])
 
@@ -310,13 +315,13 @@ def _late_sensor(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 def _lag(rng: Rng, scene: Scene, axis: int) -> Drawn:
     lag = between(rng, 0.6e-3, 3e-3)
-    # The engine holds an activation over its step: torque is late by half of it, too.
+    # The engine holds an activation over its step, which delays torque by half a step.
     held = 0.5 * scene.robot.sample_time_s / STEPS_PER_SAMPLE
     return Drawn("actuator_bandwidth", axis, {"time_constant_s": lag + held}, Native(lag_s=lag))
 
 
 def _loop(rng: Rng, _scene: Scene, axis: int) -> Drawn:
-    # Of a drive that is tuned to overshoot by a tenth, or hardly.
+    # A drive tuned for an overshoot of about 0.1 or less.
     lag, damping = between(rng, 0.5e-3, 2e-3), float(rng.uniform(0.3, 0.8))
     values = {"time_constant_s": lag, "damping": damping}
     return Drawn("current_loop", axis, values, laws=[laws.ResonantLoop(lag, damping)])
@@ -350,7 +355,7 @@ def _inertia(rng: Rng, _scene: Scene, axis: int) -> Drawn:
 
 
 def _payload(rng: Rng, scene: Scene, _axis: int) -> Drawn:
-    # Beyond the tolerance of the last link, 680 kg to 1.5 %: less is production scatter.
+    # More than the last link's tolerance (1.5 % of 680 kg), which is production scatter.
     mass = between(rng, 0.075, 0.22) * scene.last_kg
     link = next(j.link for j in reversed(scene.robot.joints) if j.link is not None)
     x, y, z = (float(c + rng.uniform(-0.3, 0.3) * scene.reach) for c in link.com_m)
@@ -359,7 +364,7 @@ def _payload(rng: Rng, scene: Scene, _axis: int) -> Drawn:
 
 
 def _of_link(scene: Scene, axis: int, quantity: str) -> tuple[str, float]:
-    """Return the name and the nominal value of a parameter of the link of an axis."""
+    """Return name and nominal value of a parameter of an axis's link."""
     name = scene.robot.axis_parameter(axis, quantity)
     assert name is not None  # every axis of the preset moves a link
     return name, scene.robot.parameters()[name]
@@ -417,7 +422,7 @@ def _gains(rng: Rng, _scene: Scene, axis: int) -> Drawn:
 
 def _speed_filter(rng: Rng, scene: Scene, axis: int) -> Drawn:
     lag, sample = between(rng, 1e-3, 5e-3), scene.robot.sample_time_s
-    # Of an exact lag; the library states that of a backward difference which forgets as fast.
+    # The engine's lag is exact; the library states that of a backward difference with the same decay.
     stated = sample / -float(np.expm1(-sample / lag)) - sample
     return Drawn("velocity_filter", axis, {"time_constant_s": stated}, Native(filter_s=lag))
 
@@ -430,7 +435,7 @@ def _fed_forward(rng: Rng, scene: Scene, axis: int) -> Drawn:
 
 
 def _limit(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    # Of what moves the axis beyond what holds it: a motor that cannot hold its arm logs its limit, and no more.
+    # Relative to the torque beyond holding: a motor that cannot hold its arm only logs its limit.
     held, largest = scene.at_rest_nm(axis), float(scene.largest_nm[axis - 1])
     limit = held + float(rng.uniform(0.75, 0.9)) * max(largest - held, 0.0)
     return Drawn("torque_saturation", axis, {"limit_nm": limit}, laws=[laws.Limit(limit)])
@@ -493,7 +498,7 @@ KINDS: Mapping[str, Kind] = {
     "torque_deadband": Kind(_deadband, axes=unloaded),
     "controller_gain": Kind(_gains),
     "velocity_filter": Kind(_speed_filter),
-    # Beyond what the same link of another machine weighs.
+    # More than the production scatter of the link.
     "link_mass": Kind(_link_share("link_mass", "mass", 0.08, 0.3)),
     "link_inertia": Kind(_link_share("link_inertia", "inertia_scale", 0.2, 0.8)),
     "link_com": Kind(_link_com),
@@ -516,7 +521,7 @@ KINDS: Mapping[str, Kind] = {
     "friction_step": Kind(_friction_step, in_library=False),
     "cubic_damper": Kind(_cubic_damper, in_library=False),
 }
-"""By name."""
+"""Kinds by name of the effect."""
 
 BY_REFERENCES = frozenset(
     {
@@ -529,4 +534,4 @@ BY_REFERENCES = frozenset(
         "velocity_filter",
     }
 )
-"""What shows by references only, or is in the logged torque from which they would be recovered."""
+"""Effects that only references show, or that are part of the logged torque."""

@@ -1,4 +1,4 @@
-"""What is withheld from simulators in the engine on Pinocchio: the same kinds, most by other formulas."""
+"""Withheld effects for the engine on Pinocchio: the same kinds, most with other formulas."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign, turning
 from axisight.blind.withheld import BEHIND, KINDS, behind, on_joint, uneven, yielding
 
 DRY_STRAIN_RAD = 2e-3
-"""Angle of a motor over which dry friction comes after a reversal."""
+"""Motor angle over which dry friction builds up after a reversal."""
 
 
 Law = Callable[[Rng, Scene, int, Mapping[str, float]], Formula]
 
 
 def _by(name: str, law: Law) -> Kind:
-    """Return a kind of `withheld`, as large and where it is there, by another law (of its values)."""
+    """Return a kind of `withheld` with the same sizes and axes, but another law of its parameters."""
     kind = KINDS[name]
 
     def draw(rng: Rng, scene: Scene, axis: int) -> Drawn:
@@ -29,7 +29,7 @@ def _by(name: str, law: Law) -> Kind:
         laws = [law(rng, scene, axis, drawn.parameters)]
         if BEHIND in drawn.parameters:
             laws = [friction_formulas.BehindGear(law) for law in laws]
-        # What MuJoCo makes by itself, the law makes here.
+        # The law replaces MuJoCo's native change.
         return replace(drawn, laws=laws, native=NOTHING)
 
     return replace(kind, draw=draw)
@@ -79,7 +79,7 @@ def _tone(rng: Rng, _scene: Scene, _axis: int, values: Mapping[str, float]) -> F
 def _stribeck(rng: Rng, scene: Scene, axis: int) -> Drawn:
     dry, speed = between(rng, 0.25, 0.6) * scene.torque(axis), between(rng, 2.0, 8.0)
     excess = dry * float(rng.uniform(0.5, 1.3))
-    # The excess falls as a hyperbolic tangent, in the library like a bell.
+    # A hyperbolic tangent as excess, a bell curve in the library: their numbers do not compare.
     values = {"coulomb_nm": dry, "tanh_excess_nm": excess, "tanh_speed_rad_s": speed}
     law = formulas.TanhStribeck(dry, excess, speed, 0.1)
     return Drawn("stribeck_friction", axis, values, laws=[law])
@@ -92,7 +92,7 @@ def _behind(drawn: Drawn) -> list[Formula]:
 def _drag(rng: Rng, scene: Scene, axis: int) -> Drawn:
     speed = scene.speed(axis)
     size = between(rng, 0.4, 1.5) * scene.of_joint(axis, "viscous_friction") * speed
-    # A power of 7/4 is no square.
+    # The library's square has no parameters for the power 7/4.
     values = {"churning_nm": size, "churning_speed_rad_s": speed}
     return Drawn("quadratic_drag", axis, values, laws=[formulas.Churning(size, speed)])
 
@@ -101,7 +101,7 @@ def _balancer(rng: Rng, scene: Scene, axis: int) -> Drawn:
     force = sign(rng) * between(rng, 0.1, 0.6) * scene.rated_nm(axis)
     crank, free = float(rng.uniform(0.1, 0.3)), float(rng.uniform(0.3, 0.6))
     angle = float(rng.choice([0.0, rng.uniform(-0.5, 0.5)]))
-    # Of a spring with a free length the torque is no sine.
+    # A free length makes the torque differ from the library's sine.
     values = {"spring_nm": force, "free_length": free, "upright_rad": angle}
     law = joint_formulas.SpringBalancer(force, crank, free, angle)
     return Drawn("gravity_compensation", axis, values, laws=[law])
@@ -117,14 +117,14 @@ def _hose(rng: Rng, scene: Scene, axis: int) -> Drawn:
 def _cubic(rng: Rng, scene: Scene, axis: int) -> Drawn:
     cubic = between(rng, 1.1e5, 8e5) * scene.stiffness(axis) / scene.deflection(axis) ** 2
     law = formulas.HardeningSpring(cubic)
-    # Where higher orders of the sine join, the library's cube is another one.
+    # The hyperbolic sine has higher orders, so that its cubic coefficient differs from the library's.
     return Drawn("nonlinear_stiffness", axis, {"third_order_nm_rad3": cubic}, laws=[law])
 
 
 def _lost_motion(rng: Rng, scene: Scene, axis: int) -> Drawn:
     softness, width = between(rng, 0.4, 0.9), between(rng, 1e-4, 4e-4) * scene.deflection(axis)
     law = formulas.SmoothMiddle(softness * scene.stiffness(axis), width)
-    # A hyperbolic tangent is as wide as it is by another number than the library's.
+    # The width of a hyperbolic tangent does not compare with the library's.
     values = {"softness": softness, "tanh_width_rad": width}
     return Drawn("lost_motion", axis, values, laws=[law])
 
@@ -133,13 +133,13 @@ def _hysteresis(rng: Rng, scene: Scene, axis: int) -> Drawn:
     share, slip = between(rng, 0.15, 0.4), between(rng, 1e-4, 4e-4) * scene.deflection(axis)
     stiff = share * scene.stiffness(axis)
     law = formulas.DahlGear(stiff, stiff * slip)
-    # What slips also as a load is taken off is stated in other numbers than the library's.
+    # Dahl's bristles slip on unloading too, so that their numbers do not compare with the library's.
     values = {"dahl_share": share, "dahl_deflection_rad": slip}
     return Drawn("gear_hysteresis", axis, values, Native(spring=-share), [law])
 
 
 def _torque_ripple(rng: Rng, scene: Scene, axis: int) -> Drawn:
-    # Of slots and of pairs of poles.
+    # Orders of slots and of pole pairs.
     slots = [float(n) for n in rng.choice([6.0, 12.0, 18.0, 36.0], 2, replace=False)]
     sizes = [between(rng, 0.08, 0.3) * scene.torque(axis) for _ in slots]
     phases = [float(p) for p in rng.uniform(0, 2 * np.pi, 2)]
@@ -152,7 +152,7 @@ def _torque_ripple(rng: Rng, scene: Scene, axis: int) -> Drawn:
 def _resolver_ripple(rng: Rng, _scene: Scene, axis: int) -> Drawn:
     pairs = int(rng.choice([1, 2, 3]))
     imbalance, offset = (sign(rng) * between(rng, 4e-4, 1.5e-3) for _ in range(2))
-    # To first order: half the imbalance at twice, the offset at once the electrical angle.
+    # First order: half the imbalance at twice the electrical angle, the offset at that angle.
     values = {
         "order_1": float(pairs),
         "amplitude_1_rad": abs(offset) / pairs,
@@ -186,7 +186,7 @@ def _push(rng: Rng, scene: Scene, axis: int) -> Drawn:
     return Drawn("push", axis, {"torque_nm": size}, laws=[law])
 
 
-# Cubic dampers and what the tendons and the constraint solver of MuJoCo make are other formulas here.
+# Kinds that stay unless a formula below replaces them; a quadratic damper replaces the cubic one.
 _SHARED = {name: kind for name, kind in KINDS.items() if name != "cubic_damper"}
 
 KINDS_BY_FORMULA: Mapping[str, Kind] = (
@@ -250,4 +250,4 @@ KINDS_BY_FORMULA: Mapping[str, Kind] = (
         "push": Kind(_push, in_library=False),
     }
 )
-"""By name."""
+"""Kinds by name of the effect."""

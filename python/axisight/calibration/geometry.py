@@ -1,8 +1,8 @@
 """Geometry of a chain with its errors: forward kinematics and exact derivatives.
 
-The map of Wernholt (2004), (4.1): tool location as a function of joint variables and of
-parameters theta. Every joint has an origin, an axis, an offset and a compliance; a base frame
-lies before the chain, a tool frame behind it.
+The map of Wernholt (2004), (4.1), gives the tool location as a function of joint variables and
+parameters theta. Every joint has an origin, an axis, an offset and a compliance. A base frame
+precedes the chain, and a tool frame follows it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 
 GROUPS = ("compliance", "offset", "tilt", "origin", "tool", "base")
-"""Kinds of parameters, those first that a combination is named after."""
+"""Groups of parameters. A combination is named after its parameter in the earliest group."""
 
 
 @summarized
@@ -31,17 +31,17 @@ class Geometry:
     At zero angle the frame of every link is parallel to that of its parent.
 
     joint_names, driven, sliding
-        Of all joints, base to tip: name, whether a motor drives it, whether it slides.
+        For every joint, base to tip: name, whether a motor drives it, whether it slides.
     origin_m, axis
-        (n_joints, 3), of every joint in its parent's frame; axes are unit vectors.
+        (n_joints, 3), origin [m] and axis of every joint in its parent's frame; axes are unit vectors.
     offset_rad
         (n_joints,), added to the joint angle [rad or m]; zero for elastic joints.
     compliance_rad_nm
         (n_joints,), deflection per load torque [rad/Nm or m/N].
     base_rotation, base_position_m
-        (3, 3) and (3,), the robot's base in the frame of the measuring device.
+        (3, 3) and (3,) [m], the robot's base in the frame of the measuring device.
     tool_rotation, tool_position_m
-        (3, 3) and (3,), the target that is measured in the frame of the last link.
+        (3, 3) and (3,) [m], the measured target in the frame of the last link.
     """
 
     joint_names: tuple[str, ...]
@@ -72,9 +72,9 @@ class Geometry:
     ) -> tuple[Array, Array]:
         """Return rotations (n, 3, 3) and positions (n, 3) [m] of the target.
 
-        ``joint_angle_rad`` (n, n_axes) are the angles of the driven joints ahead of their
-        springs, r phi; ``torque_nm`` (n, n_joints) the torques [Nm] that joints have to hold,
-        none by default.
+        ``joint_angle_rad`` (n, n_axes) are the angles r phi of the driven joints, before their
+        springs. ``torque_nm`` (n, n_joints) are the torques [Nm] that the joints hold, zero by
+        default. Raises InputError for other shapes and values that are not finite.
         """
         angle = _rows("joint_angle_rad", joint_angle_rad, sum(self.driven))
         load = (
@@ -96,11 +96,12 @@ def nominal_geometry(
     base_position_m: ArrayLike = (0.0, 0.0, 0.0),
     base_rotation: ArrayLike | None = None,
 ) -> Geometry:
-    """Return the geometry in a robot description; compliances are those of its springs.
+    """Return the geometry of a robot description, with the compliances of its springs.
 
-    ``tool_position_m`` and ``tool_rotation`` place the target in the frame of the last link,
-    ``base_position_m`` and ``base_rotation`` the robot's base in the frame of the measuring
-    device; rotations are (3, 3), the identity by default. Raises InputError naming the field.
+    ``tool_position_m`` and ``tool_rotation`` place the target in the frame of the last link.
+    ``base_position_m`` and ``base_rotation`` place the robot's base in the frame of the measuring
+    device. Positions are (3,) [m]; rotations are (3, 3), the identity by default. Raises InputError
+    naming the field.
     """
     joints = robot.joints
     stiffness = [np.inf if joint.spring is None else joint.spring.stiffness for joint in joints]
@@ -122,9 +123,9 @@ def nominal_geometry(
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Where all frames are, rows over configurations.
+    """Locations of all frames, for n configurations and j joints.
 
-    ``angle`` (n, j); ``parent`` and ``link`` (n, j, 3, 3) rotations before and after a joint;
+    ``angle`` (n, j); ``parent`` and ``link`` (n, j, 3, 3), rotations before and after a joint;
     ``origin`` (n, j, 3); ``tool_rotation`` (n, 3, 3); ``tool_position`` (n, 3).
     """
 
@@ -137,7 +138,7 @@ class Chain:
 
 
 def walk(geometry: Geometry, joint_angle: Array, torque: Array) -> Chain:
-    """Place every frame of the chain; torques bend joints back by compliance times torque."""
+    """Return the locations of all frames; a torque turns its joint back by compliance times torque."""
     n, joints = len(joint_angle), geometry.n_joints
     angle = geometry.offset_rad - geometry.compliance_rad_nm * torque
     angle[:, np.array(geometry.driven)] += joint_angle
@@ -166,10 +167,10 @@ def walk(geometry: Geometry, joint_angle: Array, torque: Array) -> Chain:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Parameters theta about a nominal geometry, and the geometry they lead to.
+    """Parameters theta: deviations from a nominal geometry.
 
-    ``kinds`` are (group, joint, component) of every parameter, joint -1 for frames; ``names``
-    their names; ``scale`` the change [unit] that counts as typical.
+    ``kinds`` are (group, joint, component) of every parameter, with joint -1 for frames; ``names``
+    and ``units`` are theirs. ``tangents`` are the two directions in which each axis can tilt.
     """
 
     nominal: Geometry
@@ -236,7 +237,7 @@ class Errors:
         return chain, out
 
     def _turning(self, theta: Array) -> dict[str, Array]:
-        """Left Jacobians of the finite rotations theta stands for."""
+        """Return the left Jacobians of the finite rotations in ``theta``."""
         turn: dict[str, Array] = {"base": np.zeros(3), "tool": np.zeros(3)}
         for (group, joint, part), value in zip(self.kinds, theta, strict=True):
             if group == "tilt":
@@ -264,7 +265,7 @@ def _frame_column(
 
 
 def _tilt_column(out: Array, now: Geometry, chain: Chain, j: int, delta: Array) -> None:
-    """Turning the axis turns what the joint did, and leaves the joint's frame at zero angle."""
+    """Write the derivative by a tilt, which turns the joint's motion but not its frame at zero angle."""
     if now.sliding[j]:
         out[:, :3] = chain.angle[:, j, None] * (chain.parent[:, j] @ np.cross(delta, now.axis[j]))
         return
@@ -307,7 +308,7 @@ def errors_about(nominal: Geometry, groups: Sequence[str], *, rotation: bool) ->
 
 
 def _tangents(axis: Array) -> tuple[Array, list[tuple[str, str]]]:
-    """Two directions (j, 2, 3) at right angles to every axis, named x, y or z where they are."""
+    """Return two directions (j, 2, 3) normal to every axis, and their names (x, y, z if parallel to one)."""
     out = np.empty((len(axis), 2, 3))
     labels = []
     for j, a in enumerate(axis):
@@ -324,7 +325,7 @@ def _tangents(axis: Array) -> tuple[Array, list[tuple[str, str]]]:
 
 
 def _turn(vector: Array) -> Array:
-    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), Rodrigues' formula."""
+    """Return the rotation matrices (..., 3, 3) of rotation vectors (..., 3), Rodrigues' formula."""
     angle = np.linalg.norm(vector, axis=-1)[..., None, None]
     k = cross_matrix(vector)
     # np.sinc(x) is sin(pi x) / (pi x): smooth at zero.
@@ -334,7 +335,7 @@ def _turn(vector: Array) -> Array:
 
 
 def left_jacobian(vector: Array) -> Array:
-    """The J (..., 3, 3) of ``exp(v + dv) = exp(J dv) exp(v)`` for rotation vectors v (..., 3)."""
+    """Return J (..., 3, 3) with ``exp(v + dv) = exp(J dv) exp(v)`` for rotation vectors v (..., 3)."""
     angle = np.linalg.norm(vector, axis=-1)[..., None, None]
     k = cross_matrix(vector)
     b = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
@@ -345,7 +346,7 @@ def left_jacobian(vector: Array) -> Array:
 
 
 def cross_matrix(vector: Array) -> Array:
-    """Matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
+    """Return the matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
     out = np.zeros((*vector.shape, 3))
     x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
@@ -388,7 +389,7 @@ def _rotation(field: str, value: ArrayLike | None) -> Array:
 
 
 def refuse_no_rotation(field: str, matrices: Array) -> None:
-    """Refuse matrices (n, 3, 3) that are not rotations."""
+    """Raise InputError for matrices (n, 3, 3) that are not rotations."""
     off = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max()
     if off > 1e-6 or np.any(np.linalg.det(matrices) < 0):
         raise InputError(

@@ -29,21 +29,21 @@ from axisight.statistics.evaluation import last_value
 Status = Literal["converged", "max_iterations", "stalled"]
 
 _TYPICAL = 1e-3
-"""Errors of a machine as it is delivered: a millimetre, a milliradian."""
+"""Typical error of a delivered machine [m and rad]."""
 _DETERMINED = 1.0
-"""Least whitened, scaled singular value: the standard error of a direction is a typical error."""
+"""Least whitened, scaled singular value: there the standard error is one typical error."""
 _LOOKS = 3
-"""How often the directions that are seen are decided again at the solution."""
+"""How often the identifiable directions are determined again at the solution."""
 _NAMED = 0.01
-"""Share of a typical error from which on a parameter is named in a combination."""
+"""Least weight, relative to typical errors, at which a combination names a parameter."""
 _ROUNDING = 1e-9
-"""A joint torque below this share of the largest is rounding: the load lies on the axis."""
+"""A joint torque below this share of the largest is rounding, because the load lies on the axis."""
 _STEP = 1e-9
-"""A step this small against the errors found is the last: rounding, or the end."""
+"""The search ends with a step this small relative to the errors found."""
 _FALL = 1e-14
-"""A loss that falls by this share no longer falls."""
+"""The search ends when the loss falls by less than this share."""
 _LEFT = 1e-3
-"""Standard deviations of the residuals that a search may leave to be gained where it ends."""
+"""Largest predicted gain, in standard deviations of the residuals, at which a search has converged."""
 _ADVICE: dict[str, str] = {
     "converged": "",
     "max_iterations": "still moving: allow more iterations, or start from a better nominal geometry",
@@ -57,11 +57,12 @@ _ADVICE: dict[str, str] = {
 @summarized
 @dataclass(frozen=True)
 class Combination:
-    """What the measurements determine: a parameter with those that cannot be told from it.
+    """A combination of parameters that the measurements determine.
 
-    ``name`` reads like ``tool.x + 1 axis6.origin_x``; it ends in ``+ ...`` if there are
-    parameters that count for less than a hundredth. ``weights`` has all of them, by name.
-    ``value`` and ``standard_error`` are in the ``unit`` of the first parameter.
+    It holds a parameter and those that the measurements cannot tell from it. ``name`` reads like
+    ``tool.x + 1 axis6.origin_x``; it ends in ``+ ...`` if further parameters have a weight below one
+    hundredth. ``weights`` has all weights by name. ``value`` and ``standard_error`` are in the
+    ``unit`` of the first parameter.
     """
 
     name: str
@@ -77,33 +78,33 @@ class Calibration:
     """A calibrated geometry and how well it is known.
 
     geometry
-        The corrected geometry; of all that fit equally well the one nearest to the nominal.
+        The corrected geometry. Of all that fit equally well, it is the nearest to the nominal one.
     nominal
-        What it started from.
+        The geometry at the start of the search.
     table
         Over ``parameter``: ``deviation``, ``standard_error`` (infinite where only a combination
         is determined) and ``identifiable``; units in the coordinate ``unit``.
     covariance
-        (n_parameters, n_parameters), of the deviations in the order of ``table``; infinite variance
-        and NaN beside it where ``table`` has an infinite standard error.
+        (n_parameters, n_parameters), of the deviations in the order of ``table``. Where ``table`` has
+        an infinite standard error, the variance is infinite and the covariances are NaN.
     combinations
         The identifiable combinations, as many as ``rank``.
     status, advice, iterations
         How the search ended: ``"converged"``, ``"max_iterations"`` or ``"stalled"``.
     rank, singular_values
-        Of the whitened Jacobian at the solution, columns scaled to typical errors (1 mm,
-        1 mrad, a compliance that gives 1 mrad under the largest load). ``rank`` are those above
-        one: directions known better than a typical error.
+        Singular values of the whitened Jacobian at the solution, with columns scaled to typical
+        errors (1 mm, 1 mrad, a compliance that gives 1 mrad under the largest load). ``rank`` counts
+        those above one, that is, directions known better than a typical error.
     observability
-        Geometric mean of the singular values that count over the square root of the number of
-        residuals (Borm and Menq 1991); larger is better.
+        Geometric mean of the ``rank`` largest singular values, divided by the square root of the
+        number of residuals (Borm and Menq 1991); larger is better.
     residual_scale
-        Scatter of the residuals in units of the standard deviations given; 1 if those are right.
+        Scatter of the residuals in units of the given standard deviations, 1 if these are right.
         Standard errors are multiplied by it.
     errors
-        Root mean square and largest error, over (``when``: nominal or calibrated, ``of``:
-        fit, cross_validation or validation) and per kind of measurement; NaN where there is none.
-        Cross-validation predicts every measurement from a fit without it.
+        Root mean square and largest error [m or rad] per kind of measurement, over ``when`` (nominal
+        or calibrated) and ``of`` (fit, cross_validation or validation); NaN for kinds that were not
+        measured. Cross-validation predicts every measurement from a fit without it.
     """
 
     geometry: Geometry
@@ -121,7 +122,7 @@ class Calibration:
     errors: xr.Dataset
 
     def _repr_html_(self) -> str:
-        """Deviations with standard errors, for notebooks."""
+        """Return the deviations with standard errors, for notebooks."""
         names, units = ([str(x) for x in self.table[key].values] for key in ("parameter", "unit"))
         found = self.table
         return html.page(
@@ -144,25 +145,25 @@ def calibrate(
     seed: int = 0,
     max_iterations: int = 30,
 ) -> Calibration:
-    """Return the geometry that explains measurements of a target on the tool.
+    """Return the geometry that best explains measurements of a target on the tool.
 
     Parameters
     ----------
     robot : the description; its links and payload load the joints.
-    measurements : absolute (:class:`Positions`, :class:`Poses`) and relative
-        (:class:`Distances`, :class:`SamePoint`) ones, in any mixture.
-    nominal : where to start, with base and tool frames; :func:`nominal_geometry` by default.
-    identify : what may be wrong, out of ``"compliance"``, ``"offset"``, ``"tilt"``,
+    measurements : any mixture of absolute (:class:`Positions`, :class:`Poses`) and relative
+        (:class:`Distances`, :class:`SamePoint`) measurements.
+    nominal : start of the search, with base and tool frames; :func:`nominal_geometry` by default.
+    identify : groups of parameters to identify, out of ``"compliance"``, ``"offset"``, ``"tilt"``,
         ``"origin"``, ``"tool"`` and ``"base"``.
-    loads : what the joints hold; gravity on the links of the description by default.
+    loads : loads that the joints hold; by default gravity on the links of the description.
     validation : measurements kept out of the fit, for the errors only.
     folds : parts of the cross-validation, drawn with ``seed``; 0 for none.
-    max_iterations : steps that the search (Levenberg-Marquardt) may try.
+    max_iterations : most steps that the search (Levenberg-Marquardt) tries.
 
-    Directions that the measurements cannot see stay at their nominal values: those known no
-    better, with the standard deviations given, than a typical error. The base frame
-    should be known to some degrees: nothing finds it from nothing. Raises InputError naming the
-    field; an iteration that does not converge is a status.
+    A direction stays at its nominal value if its standard error, from the given standard deviations,
+    is above a typical error. Give the base frame to within some degrees, because the search needs
+    such a start. Raises InputError naming the field, and for fewer measurements than combinations; a
+    search that does not converge is a status.
 
     """
     given = measurements if isinstance(measurements, Sequence) else (measurements,)
@@ -226,7 +227,7 @@ class _Found:
 
 
 class _Problem:
-    """Whitened residuals of all measurements over the directions that they can see."""
+    """Whitened residuals of all measurements, over the directions that these determine."""
 
     def __init__(
         self,
@@ -240,7 +241,7 @@ class _Problem:
         self.look(np.zeros(len(scale)))
 
     def look(self, theta: Array) -> None:
-        """Decide at ``theta`` which directions the measurements can see."""
+        """Determine at ``theta`` which directions the measurements can identify."""
         _, jacobian = self.residual(theta)
         _, s, right = np.linalg.svd(jacobian * self.scale, full_matrices=False)
         if s[0] <= _DETERMINED:
@@ -258,10 +259,10 @@ class _Problem:
         return np.concatenate([r for r, _ in parts]), np.concatenate([j for _, j in parts])
 
     def solve(self) -> _Found:
-        """Solve over the directions seen at the nominal geometry, then over those seen there.
+        """Search over the directions identifiable at the nominal geometry, then at the solution.
 
-        At a wrong geometry relative measurements seem to see what they do not, by as little as
-        it is wrong.
+        At a wrong geometry, relative measurements seem to determine some directions that they do
+        not; the smaller the error of the geometry, the weaker this effect.
         """
         found = self._search(np.zeros(len(self.scale)), self.max_iterations)
         for _ in range(_LOOKS):
@@ -277,7 +278,7 @@ class _Problem:
         return found
 
     def _search(self, theta: Array, iterations: int) -> _Found:
-        """Search over the directions seen, from what ``theta`` has of them."""
+        """Search over the identifiable directions, from the projection of ``theta`` on them."""
         move = self.scale[:, None] * self.seen
         both = last_value(lambda z: self.residual(move @ z))
 
@@ -300,14 +301,14 @@ class _Problem:
         )
         residual, jacobian = both(ended.x)
         status: Status = "converged"
-        # Whatever ended the search: it is over where nothing is left to be gained.
+        # A search has converged if no gain is left, whatever criterion ended it.
         if _promised(jacobian @ move, residual) > _LEFT:
             status = "stalled" if ended.status > 0 else "max_iterations"
         loss = float(residual @ residual)
         return _Found(move @ ended.x, loss, jacobian, status, int(ended.nfev) - 1)
 
     def without(self, fold: NDArray[np.int64], k: int) -> tuple[_Problem, list[Checked]]:
-        """The problem without fold ``k``, and what was left out."""
+        """Return the problem without fold ``k``, and the measurements left out."""
         inside: list[Checked] = []
         outside: list[Checked] = []
         at = 0
@@ -323,19 +324,19 @@ class _Problem:
 
 
 def _promised(slope: Array, residual: Array) -> float:
-    """What a linear model says that is still to be gained, over the scatter of the residuals."""
+    """Return the gain that a linear model still predicts, relative to the scatter of the residuals."""
     fitted = slope @ np.linalg.lstsq(slope, residual, rcond=None)[0]
     scatter = max(1.0, float(np.sqrt(np.mean(residual**2))))
     return float(np.linalg.norm(fitted)) / scatter
 
 
 def _scales(errors: Errors, data: Sequence[Checked]) -> Array:
-    """Typical sizes: a milliradian, a millimetre; a compliance that gives one under load."""
+    """Return typical errors: 1 mrad, 1 mm, or a compliance that gives 1 mrad under the largest load."""
     out = np.full(len(errors.kinds), _TYPICAL)
     torque = np.max([np.abs(d.torque).max(axis=0) for d in data], axis=0)
     for k, (group, joint, _) in enumerate(errors.kinds):
         if group == "compliance":
-            # A joint that never holds anything but rounding errors is not seen, whatever its scale.
+            # Without load a compliance cannot be identified, whatever its scale.
             holds = torque[joint] > _ROUNDING * torque.max()
             out[k] = _TYPICAL / torque[joint] if holds else 1.0
     return out
@@ -345,7 +346,7 @@ def _report(
     problem: _Problem, found: _Found, scatter: float
 ) -> tuple[xr.Dataset, Array, tuple[Combination, ...]]:
     errors, scale = problem.errors, problem.scale
-    # Over the directions seen, in scaled units; anything else has a zero column.
+    # Scaled units; directions that are not identifiable have a zero column.
     r = np.linalg.qr((found.jacobian * scale) @ problem.seen, mode="r")
     spread = np.linalg.solve(r, np.eye(len(r))) * scatter
     seen = (problem.seen**2).sum(axis=1)
@@ -365,7 +366,7 @@ def _report(
     combinations = []
     for lead, weights in _combinations(problem.seen):
         members = np.flatnonzero(weights)
-        # Weights of the parameters themselves, the leader's being one.
+        # From scaled to real units, with weight one for the leading parameter.
         real = weights * scale[lead] / scale
         terms = [errors.names[lead]]
         for k in members[(members != lead) & (np.abs(weights[members]) >= _NAMED)]:
@@ -387,12 +388,12 @@ def _report(
 
 
 def _combinations(seen: Array) -> list[tuple[int, Array]]:
-    """Leading parameters of the row space ``seen`` (p, rank) and the weights (p,) with them.
+    """Return the leading parameter and the weights (p,) of each combination.
 
-    Row k of ``seen`` is what is visible of parameter k. Rows are taken while they are independent
-    of those taken, first the first whose new part is at least half the largest: the weights
-    stay small, and combinations are named after the groups in their order. Every other row is a
-    sum of leading rows, and its parameter joins the combinations of those.
+    Row k of ``seen`` (p, rank) is the identifiable part of parameter k. Each step takes the first row
+    whose new part is at least half the largest. That keeps the weights small and names combinations
+    in the order of the groups. Every other row is a sum of leading rows, so its parameter joins their
+    combinations.
     """
     left = seen.copy()
     leaders: list[int] = []
@@ -410,7 +411,7 @@ def _combinations(seen: Array) -> list[tuple[int, Array]]:
     for i, lead in enumerate(leaders):
         weights = np.zeros(len(seen))
         weights[lead] = 1.0
-        # Below this is rounding.
+        # Smaller weights are rounding.
         weights[others] = np.where(np.abs(shares[:, i]) > 1e-9, shares[:, i], 0.0)
         out.append((lead, weights))
     return sorted(out, key=lambda item: item[0])
@@ -459,7 +460,7 @@ def _error_table(
 
 
 def _sizes(errors: Errors, data: Sequence[Checked], theta: Array) -> dict[str, Array]:
-    """Errors of every measurement in SI units, by kind: lengths of vectors."""
+    """Return the error of every measurement [m or rad], the length of a vector, by kind."""
     out: dict[str, list[Array]] = {}
     for d in data:
         r, _ = d.residual(errors, theta)

@@ -1,4 +1,4 @@
-"""What can be measured for a calibration, and how far a geometry is from it."""
+"""Measurements for a calibration, and their residuals for a geometry."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from axisight.robot import Robot
 @summarized
 @dataclass(frozen=True, eq=False)
 class Positions:
-    """Absolute positions of the target, as a laser tracker gives them.
+    """Absolute positions of the target, for example from a laser tracker.
 
-    ``joint_angle_rad`` (n, n_axes) are r phi of the driven joints; ``position_m`` (n, 3) is in
-    the frame of the device; ``std_m`` the standard deviation of a coordinate [m];
-    ``payload_kg`` one number or (n,), a mass at the load's centre (see :class:`Loads`).
+    ``joint_angle_rad`` (n, n_axes) are the angles r phi of the driven joints. ``position_m`` (n, 3)
+    is in the frame of the device, and ``std_m`` is the standard deviation of a coordinate [m].
+    ``payload_kg`` is one mass or (n,) masses at the load's centre (see :class:`Loads`).
     """
 
     joint_angle_rad: ArrayLike
@@ -42,8 +42,8 @@ class Positions:
 class Poses:
     """Absolute poses of the target: ``position_m`` (n, 3) and ``rotation`` (n, 3, 3).
 
-    ``std_rad`` is the standard deviation of a component of the rotation vector [rad]; the rest
-    is as in :class:`Positions`.
+    ``std_rad`` is the standard deviation of a component of the rotation vector [rad]. All other fields
+    are those of :class:`Positions`.
     """
 
     joint_angle_rad: ArrayLike
@@ -57,10 +57,10 @@ class Poses:
 @summarized
 @dataclass(frozen=True, eq=False)
 class Distances:
-    """Distances between two positions of the target, as a ball bar or a scale gives them.
+    """Distances between two positions of the target, for example from a ball bar or a scale.
 
-    ``joint_angle_rad`` (n, 2, n_axes) holds both configurations, ``distance_m`` (n,) how far
-    apart the target was; ``std_m`` [m] and ``payload_kg`` as in :class:`Positions`.
+    ``joint_angle_rad`` (n, 2, n_axes) holds both configurations. ``distance_m`` (n,) is the distance
+    between both positions. ``std_m`` [m] and ``payload_kg`` are those of :class:`Positions`.
     """
 
     joint_angle_rad: ArrayLike
@@ -72,11 +72,11 @@ class Distances:
 @summarized
 @dataclass(frozen=True, eq=False)
 class SamePoint:
-    """Configurations in which the target was at the same point, wherever that is.
+    """Configurations in which the target was at the same, unknown point.
 
-    ``joint_angle_rad`` (n, n_axes); ``point`` (n,) whole numbers, equal for configurations at
-    the same point, each at least twice; ``std_m`` [m] how well the point was met, a coordinate;
-    ``payload_kg`` as in :class:`Positions`.
+    ``joint_angle_rad`` is (n, n_axes). ``point`` (n,) are whole numbers, equal for configurations at
+    the same point, each at least twice. ``std_m`` is the standard deviation of a coordinate [m] of
+    the target about its point. ``payload_kg`` is that of :class:`Positions`.
     """
 
     joint_angle_rad: ArrayLike
@@ -91,10 +91,10 @@ Measurement: TypeAlias = Positions | Poses | Distances | SamePoint
 @summarized
 @dataclass(frozen=True)
 class Loads:
-    """What the joints hold while they are measured.
+    """Loads that the joints hold during the measurements.
 
     gravity
-        Whether the links of the description weigh on the joints.
+        Whether the joints carry the weight of the links of the description.
     payload_com_m
         Centre of mass of ``payload_kg`` in the frame of the last link [m].
     """
@@ -115,7 +115,7 @@ class Checked:
     std: tuple[float, float]
 
     def take(self, rows: NDArray[np.int64]) -> Checked:
-        """Return the rows (of ``distance`` both ends); points of one member tell nothing."""
+        """Return the given rows, without points that then have one member and tell nothing."""
         ends = (2 * rows[:, None] + np.arange(2)).ravel() if self.kind == "distance" else rows
         part = replace(
             self,
@@ -132,18 +132,18 @@ class Checked:
 
     @property
     def rows(self) -> int:
-        """Measurements held."""
+        """Number of measurements."""
         return len(self.target)
 
     @property
     def freedom(self) -> int:
-        """Independent numbers measured."""
+        """Number of independent measured numbers."""
         if self.kind == "same_point":
             return 3 * (self.rows - len(np.unique(self.target)))
         return self.rows * {"position": 3, "pose": 6, "distance": 1}[self.kind]
 
     def residual(self, errors: Errors, theta: Array) -> tuple[Array, Array]:
-        """Return model minus measurement over its standard deviation, and the derivatives."""
+        """Return (model - measurement) / standard deviation, and its derivatives."""
         chain, jacobian = errors.jacobian(theta, self.angle, self.torque)
         place, by_place = chain.tool_position, jacobian[:, :3]
         p = jacobian.shape[2]
@@ -171,9 +171,9 @@ class Checked:
         return both.ravel(), np.concatenate([slope, by_turn / self.std[1]], axis=1).reshape(-1, p)
 
     def _means(self) -> Array:
-        """Matrix (n, n) that replaces rows by the mean over their point.
+        """Return the matrix (n, n) that replaces each row by the mean over its point.
 
-        The unknown points enter linearly: with the best ones, what is left is the deviation
+        The unknown points enter linearly, so the residual for the best points is the deviation
         from the mean.
         """
         _, which = np.unique(self.target, return_inverse=True)
@@ -182,7 +182,7 @@ class Checked:
 
 
 def check(measurement: Measurement, robot: Robot, loads: Loads, where: str) -> Checked:
-    """Return the measurement with arrays checked; ``where`` starts the message of errors."""
+    """Return the measurement with arrays checked; error messages begin with ``where``."""
     kinds = {Positions: "position", Poses: "pose", Distances: "distance", SamePoint: "same_point"}
     kind = kinds.get(type(measurement))
     if kind is None:
@@ -247,9 +247,10 @@ def load_torque(
 ) -> Array:
     """Return the torques (n, n_joints) [Nm] that the joints hold at rest.
 
-    ``joint_angle_rad`` (n, n_axes) are the angles of the driven joints; ``payload_kg`` one number
-    or (n,), where ``loads`` (gravity on the links by default) says. Torques are taken at the
-    undeflected angles: the error is of second order in the deflection. Raises InputError.
+    ``joint_angle_rad`` (n, n_axes) are the angles of the driven joints. ``payload_kg`` is one mass or
+    (n,) masses, at the centre that ``loads`` gives; by default ``loads`` includes gravity on the
+    links. Torques are those at the undeflected angles, with an error of second order in the
+    deflection. Raises InputError for other shapes and values that are not finite.
     """
     held = loads or Loads()
     angle = real("joint_angle_rad", joint_angle_rad)

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 FRAMES = ("tool", "base")
 UNCHANGED = 1e-9
-"""A compliance changed by less than this share was not seen by the measurements."""
+"""The measurements did not see a compliance that changed by less than this share."""
 
 
 def identified_geometry(calibration: Calibration, provenance: Provenance) -> Identified:
@@ -36,23 +36,26 @@ def identified_geometry(calibration: Calibration, provenance: Provenance) -> Ide
     ``base``       none: the format has no base frame
     ============== =====================================================================
 
-    The file then has the calibrated geometry but for its offsets, which were found along with it:
-    add ``<joint>.offset`` of the settings' ``"no_place"`` to the joint angles, or offset over gear
-    ratio to the motor's zero, or angles are off by them. They cannot be put into the geometry, whose
-    frames are parallel at angle zero, without turning every link beyond and its inertia.
-    Frames of tool and base stand there too, as positions ``tool.x`` to ``tool.z`` and rotation vectors
-    ``tool.rotation_x`` to ``_z``; and ``<joint>.compliance`` of joints that the file has no spring
-    for. Each has ``value``, ``standard_error`` (null: unknown), ``unit`` and ``meaning``.
+    The file then has the calibrated geometry without its offsets. The settings hold values without a
+    place in the format under ``"no_place"``, each with ``value``, ``standard_error`` (null: unknown),
+    ``unit`` and ``meaning``:
+
+    - ``<joint>.offset``: add it to the joint angles, or offset over gear ratio to the motor's zero.
+      Otherwise angles are off by the offset. The geometry cannot hold it, because its frames are
+      parallel at angle zero: every later link and its inertia would have to turn.
+    - Tool and base frames: positions ``tool.x`` to ``tool.z`` and rotation vectors
+      ``tool.rotation_x`` to ``_z``, and likewise for ``base``.
+    - ``<joint>.compliance`` of joints without a spring in the file.
 
     calibration
-        Its deviations are written for all groups that were identified. Those that the
-        measurements determine in combinations only have unknown standard errors; compliances that
-        they do not see at all are left out.
+        Deviations of all identified groups are written. Standard errors are unknown for parameters
+        that the measurements determine in combinations only. Compliances that the measurements do
+        not see at all are left out.
     provenance
-        Where the values come from.
+        Source of the values.
 
-    The covariance of the deviations is carried through to first order. Raises InputError for another
-    type and for a compliance that is not positive: no spring has it.
+    The covariance follows from that of the deviations to first order. Raises InputError for another
+    type, and for a compliance that is not positive, because no spring has one.
     """
     if not isinstance(calibration, Calibration):
         raise InputError(f"calibration: expected a Calibration, got {type(calibration).__name__}")
@@ -90,7 +93,7 @@ def _unit(names: list[str], name: str) -> Array:
 
 
 def _stiffness(calibration: Calibration, joint: int) -> float | None:
-    """Stiffness of a joint, None for a joint without spring or one that was not seen."""
+    """Return the stiffness of a joint, None without a spring or if the measurements do not see it."""
     value = float(calibration.geometry.compliance_rad_nm[joint])
     before = float(calibration.nominal.compliance_rad_nm[joint])
     if before == 0.0 or np.isclose(value, before, rtol=UNCHANGED, atol=0.0):
@@ -105,7 +108,7 @@ def _stiffness(calibration: Calibration, joint: int) -> float | None:
 
 
 def _unplaced(calibration: Calibration, groups: set[str]) -> dict[str, Any]:
-    """What was identified and has no place in a robot file: value, standard error, unit, meaning."""
+    """Return identified values without a place in a robot file, with error, unit and meaning."""
     geometry, table = calibration.geometry, calibration.table
     error = dict(
         zip(table["parameter"].values, np.sqrt(np.diag(calibration.covariance)), strict=True)
@@ -143,7 +146,7 @@ def _unplaced(calibration: Calibration, groups: set[str]) -> dict[str, Any]:
 
 
 def _rotation_vector(calibration: Calibration, frame: str) -> tuple[Array, Array]:
-    """Rotation vector (3,) of a frame, and its standard errors."""
+    """Return the rotation vector (3,) of a frame [rad], and its standard errors."""
     names = [str(name) for name in calibration.table["parameter"].values]
     own = [names.index(f"{frame}.rotation_{x}") for x in "xyz"]
     matrix = getattr(calibration.geometry, f"{frame}_rotation")
@@ -158,7 +161,7 @@ def _rotation_vector(calibration: Calibration, frame: str) -> tuple[Array, Array
 
 
 def _groups(names: list[str]) -> set[str]:
-    """Groups of the parameters called ``names``."""
+    """Return the groups of the parameters called ``names``."""
     out = set()
     for name in names:
         owner, _, quantity = name.rpartition(".")
@@ -167,7 +170,7 @@ def _groups(names: list[str]) -> set[str]:
 
 
 def _axis_slopes(calibration: Calibration, names: list[str], joint: int) -> Array:
-    """Derivatives (3, n_parameters) of a joint's axis by all deviations."""
+    """Return the derivatives (3, n_parameters) of a joint's axis by all deviations."""
     errors = errors_about(calibration.nominal, ["tilt"], rotation=False)
     deviation = calibration.table["deviation"].values
     own = [

@@ -12,20 +12,20 @@ from axisight.cli import stopping
 __all__ = ["app", "main"]
 
 COMPLETE = "_AXISIGHT_COMPLETE"
-"""Set by the scripts of ``axisight completion`` where they ask for what may come next."""
+"""Environment variable that the scripts of ``axisight completion`` set to ask for completions."""
 
 
 def main() -> None:
-    """Run the command line; asked to stop, it ends without a traceback wherever it is."""
+    """Run the command line; Ctrl-C and SIGTERM end it without a traceback at any point."""
     try:
         stopping.listen()
-        # In here, for half of the time of a short command is that of its imports.
+        # Inside `try`, because a short command spends half of its time on imports.
         application = import_module("axisight.cli.application")
         if COMPLETE in os.environ:
             import_module("axisight.cli.completion").prepare()
         application.app(prog_name="axisight")
     except BaseException:
-        # Of any kind: libraries turn what stops them into errors and exits of their own.
+        # BaseException, because libraries turn KeyboardInterrupt into errors and exits of their own.
         status = stopping.asked()
         if status is None:
             raise

@@ -1,4 +1,4 @@
-"""The commands ``axisight schema`` and ``effects``: what a verdict, what the library is."""
+"""The commands ``axisight schema`` and ``axisight effects``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command line ``axisight``: its commands, each loaded when it is called."""
+"""The command line ``axisight``, whose commands load when they are called."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from typer.core import TyperGroup
 from axisight.cli.screen import OUT
 from axisight.cli.stopping import exit_status
 
-# Commands: where each lives, the group of `axisight --help` that it is in, and the first line of its
-# help. Without that line the list of commands would have to load them all, with the libraries of all.
+# Command -> (module and attribute, group in `axisight --help`, first line of its help). The line stands here,
+# because otherwise `axisight --help` would have to load all commands with all their libraries.
 _COMMANDS = {
     "diagnose": (
         "diagnose:diagnose_command",
@@ -99,13 +99,13 @@ _COMMANDS = {
 }
 
 
-# Their matrices are small and their threads many: those of the linear algebra would spin beside them.
+# Commands with many threads and small matrices, in which the threads of the linear algebra would only spin.
 _THREADED = ("blind", "demo", "diagnose", "explore")
 
-# All that these do is print.
+# Commands that only print, so that --quiet would be pointless.
 _ONLY_PRINT = ("schema", "effects", "completion", "list", "show")
 
-# What click says of several commands with names like the one that is not there.
+# The suggestion of click if several commands resemble an unknown one.
 _FURTHER = re.compile(r"(Did you mean '[^']*')(?:, '[^']*')+\?")
 
 _NEXT_STEPS = """\
@@ -120,11 +120,11 @@ axisight --help lists all commands."""
 
 
 def load_command(name: str) -> Any:
-    """Return the command of a name as click knows it."""
+    """Return the click command of a name, importing its module."""
     if name in _THREADED:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     module, attribute = _COMMANDS[name][0].split(":")
-    # What is imported stays: it need not be looked through for what can go, now or later.
+    # Imported objects stay alive, so the garbage collector need not scan them, now or later.
     gc.disable()
     found = getattr(import_module(f"axisight.cli.{module}"), attribute)
     gc.freeze()
@@ -139,12 +139,12 @@ def load_command(name: str) -> Any:
     return command
 
 
-# What stands for the value of an option in the help, by its type.
+# Placeholder for the value of an option in the help, by type.
 _VALUES = {int: "N", float: "X", str: "TEXT", Path: "PATH"}
 
 
 def _name_values(command: Any) -> None:
-    """Have the help say PATH, N or X for the value of an option, and nothing for a switch."""
+    """Set the placeholders of options in the help: PATH, N, X or TEXT, and none for a switch."""
     for part in getattr(command, "commands", {}).values():
         _name_values(part)
     if command.callback is None:
@@ -160,7 +160,7 @@ def _name_values(command: Any) -> None:
 
 
 def _add_quiet(command: Any, name: str) -> None:
-    """Give a command, or all of a group, the option ``--quiet`` where more is done than printed."""
+    """Add the option ``--quiet`` to a command, or to all of a group, except those that only print."""
     for own, part in getattr(command, "commands", {}).items():
         _add_quiet(part, own)
     if not hasattr(command, "commands") and name not in _ONLY_PRINT:
@@ -168,7 +168,7 @@ def _add_quiet(command: Any, name: str) -> None:
 
 
 def _quiet_option() -> Any:
-    """Return ``--quiet`` as click knows it: typer makes options for functions only."""
+    """Return the click option ``--quiet``, via a dummy command, as typer makes options for functions only."""
     made = typer.Typer(add_completion=False)
 
     @made.command()
@@ -196,7 +196,7 @@ def _be_quiet(wanted: bool) -> None:
 
 @contextmanager
 def _one_suggestion() -> Iterator[None]:
-    """Of the options or commands that resemble one that is not there, suggest the nearest alone."""
+    """Reduce the suggestions of click for an unknown option or command to the nearest one."""
     try:
         yield
     except Exception as error:
@@ -209,7 +209,7 @@ def _one_suggestion() -> Iterator[None]:
 
 
 class _LoadedWhenCalled(TyperGroup):
-    """A group whose commands are only names until one is called."""
+    """A group whose commands load when they are called."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         name, command, rest = super().resolve_command(ctx, args)
@@ -225,7 +225,7 @@ class _LoadedWhenCalled(TyperGroup):
             with _one_suggestion():
                 return super().invoke(ctx)
         except KeyboardInterrupt as stop:
-            # While a command was loaded, where none of its own handlers is yet at work.
+            # Stopped while a command was loading, before its own handler was in place.
             raise typer.Exit(exit_status(stop)) from None
 
 
@@ -272,7 +272,7 @@ def _options(
 
     `axisight demo` shows a diagnosis; `axisight diagnose CASE` does yours.
     """
-    # Of what only prints there would be nothing.
+    # A command that only prints would print nothing.
     _be_quiet(quiet and ctx.invoked_subcommand not in _ONLY_PRINT)
     if ctx.invoked_subcommand is None:
         typer.echo(_NEXT_STEPS)

@@ -57,7 +57,7 @@ def make_command(
     with errors(), bars() as progress:
         check_folder(cases)
         check_folder(truth)
-        # Only this command needs the engines.
+        # Imported here, because only this command needs the engines.
         from axisight.blind.drawing import Choice  # noqa: PLC0415
         from axisight.blind.make import make_cases  # noqa: PLC0415
 
@@ -135,7 +135,7 @@ def score_command(
         write_each(writes)
 
 
-# Functions of `axisight.blind.plots` by what they draw.
+# File name of a figure -> function of `axisight.blind.plots` that draws it.
 _PLOTS = {"confusion": "plot_confusion", "calibration": "plot_calibration"}
 
 

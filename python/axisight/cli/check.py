@@ -1,4 +1,4 @@
-"""The command ``axisight check``: what a log shows for itself, and beside a robot."""
+"""The command ``axisight check``: check a log alone, and together with a robot."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _fits(
     columns: Path | None,
     max_bytes: int | None,
 ) -> bool:
-    """Say what a diagnosis would refuse, flag and compare; False where it would refuse."""
+    """Print what a diagnosis would refuse, flag and compare; return False if it would refuse the log."""
     load = partial(load_simulator, options=options)
     try:
         robot, (log,) = read_beside(
@@ -99,7 +99,7 @@ def _fits(
 
 
 def _told(finding: Finding, alone: LogReport) -> bool:
-    """Whether the table of the log for itself has a doubt already; what is refused is said as a diagnosis says it."""
+    """Whether the report on the log alone already shows a flag; refusals are always printed again."""
     return finding.severity == "flag" and any(
         seen.severity != "ok" and seen.axis == finding.axis and seen.message in finding.message
         for seen in alone.findings

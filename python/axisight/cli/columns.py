@@ -1,4 +1,4 @@
-"""The commands ``axisight columns``: maps that ship with the package, and one guessed for a log."""
+"""The commands ``axisight columns``: list and show shipped column maps, and guess one for a log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all commands share: consoles, and errors as messages with an exit status."""
+"""Shared parts of all commands: options, printing, writing, and errors as messages with an exit status."""
 
 from __future__ import annotations
 
@@ -135,11 +135,11 @@ Untrusted = Annotated[
 
 @contextmanager
 def errors(stopped: str = "stopped; nothing was written") -> Iterator[None]:
-    """Turn our errors into a message and exit status 2, Ctrl-C and SIGTERM into ``stopped``."""
+    """Turn every AxisightError into a message and exit status 2, and Ctrl-C and SIGTERM into ``stopped``."""
     try:
         with warnings.catch_warnings():
-            # What NumPy says of a division in the middle of the work is no news of the result: that has findings.
-            # Of all threads, as `numpy.errstate` is not.
+            # Warnings of NumPy on intermediate values say nothing about the result, which has findings.
+            # `numpy.errstate` would act on this thread only.
             warnings.simplefilter("ignore", RuntimeWarning)
             yield
     except AxisightError as error:
@@ -154,22 +154,22 @@ def errors(stopped: str = "stopped; nothing was written") -> Iterator[None]:
 
 
 def bars() -> AbstractContextManager[Callable[[str, int, int], None]]:
-    """Show one bar per stage of the work."""
+    """Return a context that shows one progress bar per stage of the work."""
     return terminal_bars(BARS)
 
 
 def say(text: str) -> None:
-    """Print a text as it is: names of files and of users may look like markup."""
+    """Print a text without markup, because names of files and users may look like markup."""
     OUT.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def complain(text: str) -> None:
-    """Print on standard error, as it is, why a command fails: also where it is to be quiet."""
+    """Print on standard error, without markup, why a command fails, even with ``--quiet``."""
     ERR.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text whole, or on standard output for ``-``; raises OutputError as `write_whole`."""
+    """Write a text to a file, or to standard output for ``-``; raise OutputError as `write_whole`."""
     if is_output(path):
         typer.echo(text, nl=False)
     else:
@@ -177,7 +177,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_each(writes: Sequence[Callable[[], object]]) -> None:
-    """Write every output, whatever becomes of the others; raises OutputError for those that failed."""
+    """Write every output even if others fail; then raise OutputError for those that failed."""
     failed = []
     for write in writes:
         try:
@@ -189,7 +189,7 @@ def write_each(writes: Sequence[Callable[[], object]]) -> None:
 
 
 def numbers(option: str, text: str) -> list[float]:
-    """Return numbers with commas between; raises InputError naming the option."""
+    """Return the comma-separated numbers in a text; raise InputError naming the option."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
@@ -197,6 +197,9 @@ def numbers(option: str, text: str) -> list[float]:
 
 
 def one_or_each(option: str, text: str | None) -> float | list[float] | None:
-    """Return one number for all or one each, from ``VALUE,...``; None without; raises InputError naming the option."""
+    """Return one number for all axes, or a list with one each, from ``VALUE,...``; None for None.
+
+    Raises InputError naming the option.
+    """
     found = None if text is None else numbers(option, text)
     return found[0] if found is not None and len(found) == 1 else found

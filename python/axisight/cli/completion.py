@@ -1,4 +1,4 @@
-"""The command ``axisight completion``, and what answers the scripts that it prints."""
+"""The command ``axisight completion``, and the answers to the scripts that it prints."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 
 
 class Shell(StrEnum):
-    """Shells that complete."""
+    """Shells with completion."""
 
     BASH = "bash"
     ZSH = "zsh"
@@ -35,10 +35,10 @@ def completion_command(
 
 
 def prepare() -> None:
-    """Have the command line answer as the scripts ask."""
+    """Make the command line answer the requests of the completion scripts."""
     _typer().completion_init()
 
 
 def _typer() -> Any:
-    # Not `add_completion`, whose options guess the shell and write into its start files.
+    # Not typer's `add_completion`, whose options guess the shell and write into its start files.
     return import_module("typer.completion")

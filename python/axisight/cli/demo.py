@@ -1,4 +1,4 @@
-"""The command ``axisight demo``: a small case to try the diagnosis on, a machine with an effect its simulator lacks."""
+"""The command ``axisight demo``: make and diagnose a small case whose simulator lacks an effect."""
 
 from __future__ import annotations
 
@@ -27,11 +27,12 @@ _SECONDS = 5.0
 
 
 def write_demo_case(folder: Path, *, seed: int = 1, effect: Effect = DEMONSTRATION) -> Path:
-    """Write a case of three estimation and two validation logs of 5 s, and return its folder.
+    """Write a case of three estimation and two validation logs of 5 s to ``folder``; return ``folder``.
 
-    The machine differs from the preset ``irb6600_like`` by 1 % in masses,
-    stiffness and motor inertia (2 % in viscous friction, 5 % in damping), has
-    sensor noise, and ``effect``. Logs are a function of ``seed``.
+    The machine differs from the preset ``irb6600_like`` by a standard deviation of 1 % in masses, stiffness
+    and motor inertia, 2 % in viscous friction and 5 % in damping. It also has sensor noise and ``effect``.
+    The logs depend on ``seed`` and ``effect`` only. Raises InputError if the machine is unstable with
+    ``effect``.
     """
     nominal = load_robot("irb6600_like")
     machine = _scattered(nominal, seed)
@@ -57,7 +58,7 @@ def write_demo_case(folder: Path, *, seed: int = 1, effect: Effect = DEMONSTRATI
 
 
 def _scattered(robot: Robot, seed: int) -> Robot:
-    """Return a machine of the robot's type: the same but for production scatter."""
+    """Return the robot with production scatter in its parameters."""
     scatter = {
         "mass": 0.01,
         "stiffness": 0.01,
@@ -75,14 +76,14 @@ def _scattered(robot: Robot, seed: int) -> Robot:
 
 
 def _multisine(n: int, robot: Robot, rng: np.random.Generator, peak_rad_s: float) -> Array:
-    """Return a 1-40 Hz random-phase multisine on a square wave, (n, n_axes) [rad/s]."""
+    """Return references (n, n_axes) [rad/s]: a random-phase multisine of 1 to 40 Hz plus a square wave."""
     time = np.arange(n) * robot.sample_time_s
     lines = np.arange(1.0, 40.0, 1.0 / _SECONDS)
     out = np.empty((n, robot.n_axes))
     for i in range(robot.n_axes):
         phases = rng.uniform(0, 2 * np.pi, len(lines))
         wave = np.cos(2 * np.pi * np.outer(time, lines) + phases).sum(axis=1)
-        # The square wave keeps the motor out of standstill most of the time.
+        # The square wave keeps the motor away from standstill most of the time.
         square = np.tanh(20 * np.sin(2 * np.pi * time / _SECONDS))
         ramp = np.minimum(time / 0.1, 1.0)
         out[:, i] = ramp * peak_rad_s * (0.7 * wave / np.abs(wave).max() + square)

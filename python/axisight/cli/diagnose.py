@@ -53,11 +53,11 @@ EXIT_CODES: dict[VerdictKind, int] = {
     "unknown": 11,
     "undecidable": 12,
 }
-"""Exit status by verdict, with ``--exit-code``: apart from those of errors, which are 1 and 2."""
+"""Exit status by verdict, with ``--exit-code``; 1 and 2 are reserved for errors."""
 
 
 def _tolerances(given: list[str], robot: Robot) -> dict[str, float]:
-    """Return the tolerances given by quantity or name; raises InputError naming the option."""
+    """Return the tolerances [1] of ``--tolerance`` by quantity or parameter; raise InputError naming it."""
     quantities = [*DEFAULT_TOLERANCES, *gain_quantities(robot)]
     known = [*robot_parameters(robot), *gain_names(robot)]
     own = [n for n in known if n.rsplit(".", 1)[1] in quantities]
@@ -284,7 +284,7 @@ def diagnose_command(
             "--cut-at-rests": cut_at_rests,
         }
         settings = Settings(seed=seed, cutoff_hz=cutoff_hz, max_causes=max_causes)
-        # Brings what tables and schedulers need: only for those who have a fleet.
+        # Imported here, because only fleets need the libraries for tables and schedulers.
         run_fleet = import_module("axisight.cli.fleet").run_fleet
         run_fleet(fleet, out, settings, workers, scheduler, [k for k, v in for_one.items() if v])
         return
@@ -355,5 +355,5 @@ def diagnose_command(
 
 
 def _described(given: Sequence[Path], columns: Path | None) -> list[Path]:
-    """Return the files that say what is read, beside those that hold it."""
+    """Return the files that describe the logs: ``case.toml`` of case folders, and the column map."""
     return [p / "case.toml" for p in given if p.is_dir()] + [p for p in (columns,) if p]

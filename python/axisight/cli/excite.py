@@ -159,7 +159,7 @@ def excite_command(
         given = effects_on(machine, texts)
         if is_model_file(checked.robot):
             say_import(machine)
-        # Without limits or a controller nothing is simulated.
+        # Otherwise nothing is simulated, so the effects do not matter.
         if checked.limits is not None and machine.controller_kind != "none":
             say_effects(machine, checked.robot, given)
         made = excite(checked, with_given(machine, given))
@@ -206,7 +206,7 @@ def _draw(made: Excited, path: Path) -> list[Path]:
 
 
 def _figures(path: Path | None) -> list[Path]:
-    """Return the files of ``--plot``."""
+    """Return the two files of ``--plot``, [] without it."""
     return [] if path is None else [path, path.with_name(f"{path.stem}-references{path.suffix}")]
 
 

@@ -1,4 +1,4 @@
-"""What the command line asks of an experiment that a diagnosis designs."""
+"""Options of the command line for the experiment that a diagnosis designs."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def asked_experiment(
     travel_limit: str | None,
     torque_limit: str | None,
 ) -> Callable[[Robot], Asked] | None:
-    """Return what makes the experiment of a robot that goes into a folder; None without a folder.
+    """Return a function from a robot to the requested experiment; None without ``--next-experiment``.
 
-    Raises InputError, naming the option, for options of an experiment that nobody asks for, and for
-    what is no effect or no number.
+    Raises InputError, naming the option, for options of an experiment without ``--next-experiment``, for an
+    unknown effect, and for text that is not a number.
     """
     options = {
         "--to-show": to_show,

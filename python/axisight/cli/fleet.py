@@ -1,4 +1,4 @@
-"""``axisight diagnose --fleet``: many robots or many days."""
+"""``axisight diagnose --fleet``: diagnose many robots or many days."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def run_fleet(
     scheduler: str | None,
     for_one: Sequence[str],
 ) -> None:
-    """Diagnose a fleet into ``out``: verdicts, ``fleet.parquet`` and ``fleet.html``.
+    """Diagnose every case below ``folder``; write verdicts, ``fleet.parquet``, ``fleet.html`` to ``out``.
 
-    ``for_one``: options given that are for a single diagnosis, and refused.
+    ``for_one`` lists the given options that only a single diagnosis can use; any of them is refused.
     """
     with errors("stopped; finished verdicts stay, run again to go on"):
         if for_one:

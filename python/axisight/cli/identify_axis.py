@@ -206,7 +206,7 @@ def axis_command(
 
 
 def _number(axis: str, machine: Robot | None) -> int:
-    """Return the number of an axis, by its joint too where there is a robot."""
+    """Return the number (from 1) of an axis given by number, or by joint name if there is a robot."""
     if machine is not None:
         return axis_of(axis, machine, "--axis")
     if not axis.isdecimal() or int(axis) < 1:
@@ -228,7 +228,7 @@ def _ratio(machine: Robot | None, given: float | None, axis: int) -> float:
         raise InputError(
             "--gear-ratio: expected joint angle per motor angle, or --robot ROBOT that has it, got neither"
         )
-    # Motor-side data do not show which way the joint turns.
+    # Motor-side data do not show the direction in which the joint turns.
     return abs(float(machine.gear_ratio[axis - 1]))
 
 

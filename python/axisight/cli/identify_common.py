@@ -1,4 +1,4 @@
-"""What the commands ``axisight identify`` share: writing the robot, options with names."""
+"""Shared parts of the commands ``axisight identify``: reading logs, writing the robot, naming options."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ Unchecked = Annotated[
 
 
 def load_source(robot: str) -> Robot:
-    """Return a preset or the robot of a file, with the effects that an earlier command found.
+    """Return the robot of a preset or a file, with the effects that the file states.
 
-    Raises InputError as `refuse_effects_beside`.
+    Raises RobotError as `load_robot`, InputError as `refuse_effects_beside`.
     """
     machine = load_robot(robot)
     refuse_effects_beside(robot, machine)
@@ -67,11 +67,11 @@ def read_logs(
     unchecked: bool,
     used: Used = WHOLE,
 ) -> list[Log]:
-    """Return what is ``used`` of logs that pass what ``axisight check`` looks at; warnings are printed.
+    """Return the ``used`` part of logs that pass ``axisight check``; print its warnings.
 
-    Identification fits data in wrong units, or with rows missing, as well as any. Raises InputError
-    for an error that the check finds, and for what :func:`check_fit_inputs` refuses by name, unless
-    ``unchecked``, and for an axis that turns where that of the robot slides.
+    The check is needed because identification also fits data in wrong units or with missing rows. Raises
+    InputError for errors of the check and faults that :func:`check_fit_inputs` refuses, unless ``unchecked``.
+    Raises InputError for a revolute axis where the robot has a prismatic one, and the reverse.
     """
     logs = []
     said: set[tuple[str, str]] = set()
@@ -95,10 +95,10 @@ def read_logs(
 
 
 def _checked(path: Path, columns: Path | None, *, unchecked: bool) -> set[tuple[str, str]]:
-    """Print what ``axisight check`` warns of, and return it as (name of the log, message).
+    """Print the warnings of ``axisight check`` and return them as (name of the log, message).
 
-    Raises InputError for its errors, unless ``unchecked``, but for those that have a name: these are
-    refused by reading, or where they lie in the part that is used.
+    Raises InputError for errors without a stable name, unless ``unchecked``. Errors with a name are refused
+    later: by reading, or by the check of the used part.
     """
     said = set()
     for finding in check_log(path, columns).findings:
@@ -118,9 +118,10 @@ def _kinds(slides: Sequence[bool]) -> str:
 def check_out(
     out: Path | None, logs: Sequence[Path], columns: Path | None = None, *, force: bool
 ) -> None:
-    """Raise OutputError before any work for a robot that cannot be written with its sidecar.
+    """Raise OutputError before any work if the robot or its sidecar cannot be written.
 
-    Logs and their column map are never replaced, the robot with ``force``: it grows from step to step.
+    With ``force`` an existing robot is replaced, as it is refined from step to step. Logs and their column
+    map are never replaced.
     """
     if out is None:
         return
@@ -130,7 +131,7 @@ def check_out(
 
 
 def options(ctx: typer.Context) -> dict[str, Any]:
-    """Return the options of a command that say how it worked: numbers, choices, names of files."""
+    """Return the options of a command for its provenance: numbers, choices, and names of files."""
     out: dict[str, Any] = {}
     for name, value in ctx.params.items():
         if isinstance(value, list | tuple):
@@ -142,26 +143,26 @@ def options(ctx: typer.Context) -> dict[str, Any]:
 
 @contextmanager
 def as_options(ctx: typer.Context) -> Iterator[None]:
-    """Say errors of the library in the words of the shell: options instead of keyword arguments."""
+    """Rephrase errors of the library for the shell, with options in place of keyword arguments."""
     try:
         yield
     except AxisightError as error:
         raise InputError(option_words(str(error), option_names(ctx))) from None
 
 
-# Keyword arguments whose option has another name.
+# Keyword argument in a message -> option, if the names differ.
 _OPTIONS = {'deficient="group"': "--group", "`known`": "--known"}
 
 
 def option_names(ctx: typer.Context) -> list[str]:
-    """Return the names of a command's options, as its function has them; arguments have no dashes."""
+    """Return the parameter names of a command's options, without its arguments."""
     return [p.name for p in ctx.command.params if p.name and p.param_type_name == "option"]
 
 
 def option_words(text: str, options: Collection[str]) -> str:
     """Return a message with ``cutoff_hz`` as ``--cutoff-hz``, and ``method="wls"`` as ``--method wls``.
 
-    ``options``: names of the options of the command.
+    ``options`` are the parameter names of the command's options; other names stay as they are.
     """
 
     def given(found: re.Match[str]) -> str:
@@ -181,7 +182,7 @@ def option_words(text: str, options: Collection[str]) -> str:
 def provenance(
     method: str, files: Sequence[Path], settings: Mapping[str, Any], columns: Path | None = None
 ) -> Provenance:
-    """Return where values come from: hashes of files, the column map too, and the options given."""
+    """Return the provenance of identified values: hashes of logs and column map, and the given options."""
     files = [part for path in files for part in files_of(path)]
     files += [] if columns is None else [column_file(columns)]
     count = Counter(path.name for path in files)
@@ -194,7 +195,7 @@ def provenance(
 
 
 def write_robot(source: Robot, out: Path, found: Identified, *, force: bool) -> None:
-    """Write robot and sidecar and say so; raises InputError if they cannot be written."""
+    """Write robot and sidecar and print their paths; raise as `write_identified`."""
     try:
         sidecar = write_identified(source, out, found, overwrite=force)
     except OutputError as error:
@@ -204,7 +205,7 @@ def write_robot(source: Robot, out: Path, found: Identified, *, force: bool) -> 
 
 
 def pairs(option: str, given: Sequence[str] | None) -> dict[str, float]:
-    """Return the numbers in NAME=VALUE texts; raises InputError naming the option."""
+    """Return the numbers of NAME=VALUE texts by name; raise InputError naming the option."""
     out: dict[str, float] = {}
     for text in given or []:
         name, equals, value = text.partition("=")
@@ -217,7 +218,7 @@ def pairs(option: str, given: Sequence[str] | None) -> dict[str, float]:
 
 
 def band(option: str, text: str | None) -> tuple[float, float] | None:
-    """Return two numbers; raises InputError naming the option."""
+    """Return the two numbers of LOW,HIGH, None for None; raise InputError naming the option."""
     if text is None:
         return None
     found = numbers(option, text)

@@ -133,7 +133,7 @@ def elastic_command(
             left = ", ".join(e.label for e in machine.effects if e not in linear)
             say(f"not in the linear model, kept as they are: {left}")
         if out is not None:
-            # What patterns and files stood for takes their place.
+            # Record the parameters and angles themselves, not the patterns and files that gave them.
             settings = options(ctx) | {
                 "parameters": list(begin),
                 "start": begin,
@@ -171,7 +171,7 @@ def _responses(
 
 
 def _starts(robot: Robot, patterns: Sequence[str], given: dict[str, float]) -> dict[str, float]:
-    """Return the parameters that patterns name, in the order of the robot, with their starts."""
+    """Return the parameters that match the patterns, with start values, in the order of the robot."""
     known = robot_parameters(robot)
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in known):

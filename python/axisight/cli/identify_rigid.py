@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from axisight.robot_file import Provenance
 
 _FRICTION = ("viscous", "coulomb", "offset")
-# Terms of the fit that are torques an axis needs, and effects that add to the command.
+# Effects with the opposite sign: the fit has the torque that an axis needs, the effect adds to the command.
 _TURNED = frozenset(effect for effect, _, sign in RIGID_BODY_TERMS.values() if sign < 0)
 _PARAMETERS = {"estimate": "least squares", "consistent": "bodies that can exist"}
 
@@ -173,7 +173,7 @@ def rigid_body_command(
         read = read_logs(paths, columns, machine, unchecked=unchecked, used=used)
         held = ({} if rotors else _rotors(machine)) | pairs("--known", known)
         with warnings.catch_warnings():
-            # They are among the notes that are printed.
+            # The printed notes contain these warnings already.
             warnings.simplefilter("ignore", IdentificationWarning)
             found = axisight.rigid_body.identify_logs(
                 machine,
@@ -203,7 +203,7 @@ def rigid_body_command(
 def _write(
     found: LogIdentification, machine: Robot, out: Path, source: Provenance, *, force: bool
 ) -> None:
-    """Write the robot, or say why not if there are no bodies to write."""
+    """Write the robot, or print why not if no physically possible bodies were found."""
     if found.consistent is not None and found.consistent.status == "failed":
         say(
             f"not written: {out}: no bodies that can exist fit these logs; try more motions, or values of the "
@@ -226,7 +226,7 @@ def _write(
 
 
 def _rotors(machine: Robot) -> dict[str, float]:
-    """Motor inertias of the robot: without a term for them, links would hold them once more."""
+    """Return the motor inertias to hold; without them, the fit would add them to the links."""
     return {n: v for n, v in robot_parameters(machine).items() if n.endswith(".motor_inertia")}
 
 

@@ -1,4 +1,4 @@
-"""What the command line says of a model file: between which links its chain runs, and what hangs on it."""
+"""Options of the command line for a model file: first and last link of the chain, and a load."""
 
 from __future__ import annotations
 
@@ -54,9 +54,9 @@ class ModelOptions:
         return [f"--{name}" for name, text in vars(self).items() if text is not None]
 
     def drives(self, source: Path | str, file: Path | None = None) -> DriveData:
-        """Return the drive data of a model, those of ``file`` or beside it, with what was given.
+        """Return the drive data of a model, from ``file`` or beside the model, updated by the given options.
 
-        Raises InputError for a payload that is none.
+        Raises InputError for a payload that is not KG or KG,X,Y,Z.
         """
         said: dict[str, object] = {"base": self.base, "tip": self.tip}
         if self.payload is not None:
@@ -65,7 +65,7 @@ class ModelOptions:
         return drive_data(source, file).model_copy(update=stated)
 
     def load(self, source: Path | str, *, sample_time_s: float | None = None) -> Robot:
-        """Return the robot of a source; raises InputError for options that a robot file has no use for."""
+        """Return the robot of a source; raise InputError for options with a source that is no model file."""
         if not self.given():
             return load_robot(source, sample_time_s=sample_time_s)
         if not is_model_file(source):
@@ -77,7 +77,7 @@ class ModelOptions:
 
 
 AS_IT_IS = ModelOptions()
-"""Nothing was given."""
+"""No option was given."""
 
 
 def _payload(text: str) -> Payload:

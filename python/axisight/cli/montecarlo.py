@@ -26,7 +26,7 @@ from axisight.montecarlo.estimate import estimate
 from axisight.montecarlo.progress import Progress, Report
 from axisight.robot import load_robot
 
-# More runs than this are begun by mistake more often than on purpose.
+# More runs than this are more often a mistake than intended.
 _UNASKED = 100_000
 
 

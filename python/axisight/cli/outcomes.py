@@ -1,4 +1,4 @@
-"""What a diagnosis hands over in files, and what is said of each."""
+"""Write the files of a diagnosis, and print a line about each."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ _TO_SHOW = "--to-show designs one that shows what these logs would not"
 
 
 def write_found_signals(found: Diagnosis, target: Path) -> None:
-    """Write the signals of a diagnosis, and say where."""
+    """Write the signals of a diagnosis and print the path."""
     say(f"signals: {axisight.signal_files.write_signals(found.signals, target, overwrite=True)}")
 
 
 def write_found_model(
     found: Diagnosis, inputs: Inputs, options: ModelOptions, target: Path, *, force: bool
 ) -> None:
-    """Write the simulator with its causes, and say which of them it has no place for.
+    """Write the simulator with the causes found, and print what the file cannot state.
 
-    And of which the data cannot say whether it was them, and what was re-fitted beside them.
+    Also print the causes that have rivals, and the re-fitted parameters that are not written.
     """
     if not found.causes and not refitted_gains(inputs.robot, found.refit):
         say("no model was written: no cause was named")
@@ -58,7 +58,7 @@ def write_found_model(
 
 
 def _say_refitted(found: Diagnosis, made: Written) -> None:
-    """Say what was re-fitted and is not written, where causes are: the promised fall of the gap counts both."""
+    """Print re-fitted parameters that are not written, because the gap after includes their part."""
     left = {k: v for k, v in found.refit.items() if k not in made.placed}
     changes = clear_changes(left)
     if changes and found.causes:
@@ -69,9 +69,9 @@ def _say_refitted(found: Diagnosis, made: Written) -> None:
 
 
 def write_found_experiment(found: Diagnosis, folder: Path, *, to_show: bool) -> None:
-    """Write the designed experiment where there is one that decides; say why where there is none.
+    """Write the designed experiment if it decides between the causes; otherwise print why there is none.
 
-    ``to_show``: it was to show an effect; what the diagnosis advises says why there is none then.
+    ``to_show``: the user asked for an experiment that shows an effect.
     """
     made = found.experiment
     if made is None:
@@ -102,7 +102,7 @@ def _why_none(found: Diagnosis) -> str:
 def diagnosis_writes(
     found: Diagnosis, json: Path | None, report: Path | None
 ) -> list[Callable[[], object]]:
-    """Return what writes the verdict and the page of a diagnosis where they are asked for."""
+    """Return functions that write the verdict and the report of a diagnosis, for the paths that are given."""
 
     def verdict(target: Path) -> None:
         write_text(target, found.to_json())

@@ -1,4 +1,4 @@
-"""Where ``axisight diagnose`` writes: checked before anything runs, written when all is there."""
+"""The output files of ``axisight diagnose``: checked before it runs, written at its end."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from axisight.gap.facts.experiment import experiment_files
 from axisight.gap.intake.inputs import Inputs
 from axisight.storage import check_targets
 
-# How files end that an output may replace unasked: what the command makes anew.
+# Suffixes of earlier results that an output may replace without --force.
 _RESULTS = {
     "--json": (".json",),
     "--report": (".html", ".htm"),
@@ -32,9 +32,9 @@ _RESULTS = {
 
 @dataclass(frozen=True)
 class Outputs:
-    """The files that a diagnosis is asked for, None where it is not.
+    """The requested output files of a diagnosis, None for options not given.
 
-    ``to_show``: the experiment is to show an effect; ``force``: other files may be replaced.
+    ``to_show``: the experiment must show an effect. ``force``: any existing file may be replaced.
     """
 
     json: Path | None
@@ -46,7 +46,7 @@ class Outputs:
     force: bool
 
     def given(self) -> list[str]:
-        """Return the options that were given, each of which says a line once its file is written."""
+        """Return the given options, each of which prints a line when its file is written."""
         files = {
             "--json": None if is_output(self.json) else self.json,
             "--report": self.report,
@@ -57,9 +57,10 @@ class Outputs:
         return [option for option, path in files.items() if path is not None]
 
     def check(self, inputs: Inputs, read: Sequence[Path]) -> None:
-        """Refuse targets that cannot be written, or that would replace what the user has.
+        """Raise OutputError, naming the option, for files that cannot be written or must not be replaced.
 
-        ``read``: the files that are read. Raises OutputError, naming the option.
+        ``read`` are the files that the command reads. Raises MissingExtraError if a library for the signals
+        is not installed.
         """
         targets = {
             "--json": None if is_output(self.json) else self.json,
@@ -79,7 +80,7 @@ class Outputs:
     def writes(
         self, found: Diagnosis, inputs: Inputs, options: ModelOptions
     ) -> list[Callable[[], object]]:
-        """Return what writes each of them."""
+        """Return a function for each output that writes it."""
         out = diagnosis_writes(found, self.json, self.report)
         if self.next_experiment is not None:
             folder = self.next_experiment

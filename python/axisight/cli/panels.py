@@ -1,4 +1,4 @@
-"""Groups of options in ``--help``; common options stand in none, and come first."""
+"""Groups of options in ``--help``; common options are in no group and come first."""
 
 OUTPUT = "More output"
 COMPARED = "What is compared"

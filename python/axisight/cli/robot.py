@@ -1,4 +1,4 @@
-"""What commands that simulate a robot share: its effects, its own and those given; a line says so."""
+"""Shared parts of commands that simulate a robot: load it, add effects, and print which effects act."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def load_simulator(
     options: ModelOptions = AS_IT_IS,
     sample_time_s: float | None = None,
 ) -> Robot:
-    """Return the robot to simulate with the ``given`` effects, and say which of its own act.
+    """Return the robot of a source with the ``given`` effects, and print which of its own effects act.
 
-    ``options`` as in `ModelOptions.load`, ``sample_time_s`` as in `axisight.load_robot`.
+    ``options`` are those of `ModelOptions.load`; ``sample_time_s`` [s] is as in `axisight.load_robot`.
     Raises InputError as `say_effects`, and for a given effect that the robot cannot have.
     """
     robot = options.load(source, sample_time_s=sample_time_s)
@@ -55,7 +55,7 @@ def load_simulator(
 
 
 def say_import(robot: Robot) -> None:
-    """Print what is to be said of a robot out of a model file: the notes at the head of its text."""
+    """Print the notes on a robot from a model file, which are the head comments of its text."""
     for line in robot.toml.splitlines():
         if not line.startswith("# "):
             break
@@ -78,7 +78,7 @@ def with_given(robot: Robot, given: Sequence[Effect]) -> Robot:
 
 
 def say_effects(robot: Robot, source: Path | str, given: Iterable[Effect] = ()) -> None:
-    """Print which effects a robot has, but for those that ``given`` ones replace.
+    """Print the robot's own effects that act, except those that ``given`` effects replace.
 
     Raises InputError as `refuse_effects_beside`.
     """
@@ -91,9 +91,9 @@ def say_effects(robot: Robot, source: Path | str, given: Iterable[Effect] = ()) 
 
 @dataclass(frozen=True)
 class GivenEffect:
-    """An effect as the command line has it: axes are numbers or joint names that no robot has resolved yet.
+    """An effect from the command line, whose axes are still text: numbers or joint names.
 
-    ``text`` is what was given to ``option``.
+    ``text`` is the value of the ``option``.
     """
 
     option: str
@@ -103,7 +103,7 @@ class GivenEffect:
     parameters: Mapping[str, float]
 
     def on(self, robot: Robot) -> Effect:
-        """Return the effect of a robot; raises InputError quoting option and text."""
+        """Return the effect on the axes of a robot; raise InputError quoting option and text."""
         try:
             numbered = [axis_of(axis, robot) for axis in self.axes]
             if len(numbered) == 2:
@@ -114,13 +114,13 @@ class GivenEffect:
 
 
 def axis_of(text: str, robot: Robot, field: str = "axis") -> int:
-    """Return the number (from 1) of an axis that was given as text: a number, or the name of its joint."""
+    """Return the number (from 1) of an axis from text, a number or a joint name; errors as `axis_number`."""
     number = text.isdecimal() and text not in robot.axis_names
     return axis_number(int(text) if number else text, robot.axis_names, field)
 
 
 def effects_on(robot: Robot, given: Iterable[GivenEffect]) -> list[Effect]:
-    """Return effects on the axes of a robot; raises InputError as `GivenEffect.on`, and for one given twice."""
+    """Return effects on the axes of a robot; raise InputError as `GivenEffect.on`, and for a repeated one."""
     found: dict[str, Effect] = {}
     for one in given:
         effect = one.on(robot)
@@ -133,14 +133,14 @@ def effects_on(robot: Robot, given: Iterable[GivenEffect]) -> list[Effect]:
 
 
 def parse_effects(texts: Sequence[str] | None) -> list[GivenEffect]:
-    """Return the effects of a repeated ``--effect``; raises InputError as `parse_effect`."""
+    """Return the effects of a repeated ``--effect``; raise InputError as `parse_effect`."""
     return [parse_effect(text) for text in texts or []]
 
 
 def parse_effect(text: str, option: str = "--effect") -> GivenEffect:
-    """Return the effect that ``NAME@AXIS PARAM=VALUE ...`` describes, its axis not resolved yet.
+    """Return the effect of a text ``NAME@AXIS PARAM=VALUE ...``, with its axes still as text.
 
-    Axis and parameters may be left out; ``NAME@AXIS:PARAM=VALUE,...`` is read too. Raises
+    Axis and parameters may be left out; ``NAME@AXIS:PARAM=VALUE,...`` is accepted too. Raises
     InputError quoting ``option`` and ``text``.
     """
     head, *rest = re.split(r"[:\s]+", re.sub(r"\s*=\s*", "=", text.strip()), maxsplit=1)
@@ -163,7 +163,7 @@ def parse_effect(text: str, option: str = "--effect") -> GivenEffect:
 
 
 def _check_name(name: str, quoted: str) -> None:
-    """Raise InputError for a name that is no effect, with the nearest that is one."""
+    """Raise InputError, with the nearest name, for an unknown effect."""
     if name in effect_table():
         return
     near = nearest(name, effect_table())
@@ -172,7 +172,7 @@ def _check_name(name: str, quoted: str) -> None:
 
 
 def _check_parameter(effect: str, key: str, quoted: str) -> None:
-    """Raise InputError for a parameter that the effect does not have."""
+    """Raise InputError, with the nearest name, for a parameter that the effect does not have."""
     known = [p.name for p in effect_info(effect).parameters]
     if key in known:
         return

@@ -1,4 +1,4 @@
-"""The commands ``axisight robot``: robot files from the model files that people have."""
+"""The commands ``axisight robot``: make robot files from model files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a command says to people: on standard output, beside data that goes there, or not at all."""
+"""Print the text of commands: on standard output, on standard error beside data, or not at all."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Any
 
 from rich.console import Console
 
-# Colours are rich's own choice: none where it is no terminal, or where NO_COLOR is set.
+# rich chooses the colours: none without a terminal, or if NO_COLOR is set.
 ERR = Console(stderr=True)
 BARS = Console(stderr=True)
-"""Standard error once more, for what shows progress: silent where errors are not."""
+"""A second console on standard error for progress bars, which ``--quiet`` silences but errors not."""
 
 
 class Screen:
-    """Standard output, or standard error while data has the output to itself."""
+    """The console for text: standard output, or standard error if data goes to standard output."""
 
     def __init__(self) -> None:
         self._console = self._standard = Console()
@@ -27,19 +27,19 @@ class Screen:
 
     @property
     def width(self) -> int:
-        """Columns of a line."""
+        """Width of a line in characters."""
         return self._console.width
 
     def begin(self) -> None:
-        """Be as at the start of a command."""
+        """Reset to the state at the start of a command."""
         self._console, self._quiet, BARS.quiet = self._standard, False, False
 
     def be_quiet(self) -> None:
-        """Print nothing, and no progress; errors are not printed here."""
+        """Stop printing text and progress; errors go to another console."""
         self._quiet = BARS.quiet = True
 
     def leave_output(self) -> None:
-        """Print on standard error from here on."""
+        """Print on standard error from now on."""
         self._console = ERR
 
 
@@ -47,5 +47,5 @@ OUT = Screen()
 
 
 def is_output(path: Path | None) -> bool:
-    """Whether a path stands for standard output: ``-``."""
+    """Whether a path means standard output (``-``)."""
     return path is not None and str(path) == "-"

@@ -1,4 +1,4 @@
-"""A diagnosis on the screen."""
+"""Show a diagnosis on the screen."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _RANKED = 8
 _REFITTED = 10
 # A smaller change of a parameter reads as +0 %.
 _SEEN = 5e-4
-# Axes of a table of detection limits.
+# Most axes in one table of detection limits.
 _PLACES = 7
 
 
@@ -44,10 +44,10 @@ def show_account(found: Diagnosis) -> None:
 def show_diagnosis(
     found: Diagnosis, *, verbose: bool = False, given: Collection[str] = (), command: str = ""
 ) -> None:
-    """Print a diagnosis in 25 lines, or all tables with ``verbose``.
+    """Print a diagnosis in at most 25 lines, or with ``verbose`` in all tables.
 
-    ``given``: options of files that are written, which need not be offered. ``command``: what takes the options
-    that are offered; empty for the command that runs.
+    ``given`` lists the output options in use, which the next steps then do not offer. ``command`` is the
+    command that takes the offered options, empty if it is the running one.
     """
     if verbose:
         _show_all(found)
@@ -79,14 +79,14 @@ def _show_all(found: Diagnosis) -> None:
         OUT.print(_refitted(changed))
     if found.ranking:
         OUT.print(_ranking(found))
-    # What could be there all the same is the other half of finding nothing.
+    # If nothing was found, the user needs the smallest effects that would have been found.
     if found.verdict == "none" and found.detection_limits:
         for table in _limits(found):
             OUT.print(table)
 
 
 def _show_joints(found: Diagnosis) -> None:
-    """Say which joint each axis is, where joints have names of their own."""
+    """Print the joint of each axis, if joints have names of their own."""
     numbers = range(1, len(found.joints) + 1)
     named = [f"{i} {name}" for i in numbers if (name := own_name(i, found.joints))]
     if named:
@@ -94,7 +94,7 @@ def _show_joints(found: Diagnosis) -> None:
 
 
 def _show_comparison(found: Diagnosis) -> None:
-    """Say what the figures rest on, where it was chosen here or is not the robot file alone."""
+    """Print how logs and simulator were compared, if that is not the default."""
     cutoff_hz = found.provenance.get("cutoff_hz")
     if cutoff_hz is not None:
         say(f"compared: by inverse dynamics, below {cutoff_hz:.3g} Hz (--cutoff-hz)")
@@ -121,12 +121,12 @@ def _place(where: Where) -> str:
 
 
 def _percent(x: float) -> str:
-    # Narrow: a table of 80 columns has five of them.
+    # Short, because a table of 80 characters has five such columns.
     return percent(x).replace("more than", ">").replace("no share", "-")
 
 
 def _causes(found: Diagnosis) -> Table:
-    # Narrow enough for a terminal of 80 columns; longer names fold, for a cut one is of no use.
+    # Narrow enough for a terminal of 80 columns; long names fold, because cut names are useless.
     table = Table(box=SIMPLE_HEAD)
     for name in ("cause and its values", "value", "95 % interval", "probability"):
         table.add_column(name, overflow="fold")
@@ -145,7 +145,7 @@ def _gaps(found: Diagnosis) -> Table:
     for i, verdict, row in found.axis_rows():
         table.add_row(str(i), verdict, *(_percent(x) for x in row))
     table.add_row("all", found.verdict, *_stages(gap))
-    # A caption is as wide as its table: one line a sentence.
+    # rich wraps the caption to the width of the table, so each sentence gets its own line.
     table.caption = f"axis: rms error / standard deviation of the {torque_of(gap.compared)}; all: rms of the axes"
     if gap.pooled is not None:
         p = gap.pooled
@@ -182,7 +182,7 @@ def _refitted(refit: dict[str, Interval]) -> Table:
 
 
 def _limits(found: Diagnosis) -> list[Table]:
-    """Return the detection limits, so many axes a table that numbers stay whole in 80 columns."""
+    """Return the detection limits in tables of at most seven axes, so that 80 columns hold whole numbers."""
     limits = limit_table(found.detection_limits, len(found.gap.before_per_axis))
     out = []
     for first in range(0, len(limits.columns), _PLACES):

@@ -28,7 +28,7 @@ from axisight.robot_import import is_model_file
 from axisight.simulation import Method, Model, simulate
 from axisight.storage import check_targets, write_bytes
 
-# A share of the sample time by which a log may miss that of the robot.
+# Largest relative difference between the sample times of log and robot.
 _SAME_RATE = 1e-4
 
 
@@ -144,9 +144,10 @@ def simulate_command(
 def _designed(
     path: Path, source: str, load: Callable[..., Robot], experiment: int | None, periods: int
 ) -> tuple[Robot, dict[str, NDArray[np.float64]]]:
-    """Return a robot and one experiment of designed references as the input of `simulate`.
+    """Return the robot, and one experiment of designed references as the input of `simulate`.
 
-    One of a model file has the sample time of the references, unless its drive data say one.
+    A robot from a model file gets the sample time of the references, unless its drive data state one. Raises
+    InputError for references that are not speeds, another sample time, and a missing experiment.
     """
     references = read_references(path)
     robot = load(source, sample_time_s=references.sample_time_s if is_model_file(source) else None)
@@ -165,7 +166,10 @@ def _designed(
 
 
 def _inputs(log: Log, robot: Robot, *, torque: bool) -> dict[str, NDArray[np.float64]]:
-    """Return the input of `simulate` that the log has, by name."""
+    """Return the torques or speed references of the log as the input of `simulate`.
+
+    Raises InputError for a log without references or with another sample time than the robot.
+    """
     _same_rate(log.source, log.sample_time_s, robot)
     if torque:
         return {"torque_nm": log.torque_nm}
@@ -183,7 +187,7 @@ def _same_rate(source: object, sample_time_s: float, robot: Robot) -> None:
 
 
 def _log_table(result: xr.Dataset, inputs: dict[str, NDArray[np.float64]]) -> pd.DataFrame:
-    """Return the run in the native columns of a log."""
+    """Return the run as a table with the native columns of a log."""
     data = {"time_s": np.asarray(result["time"].values)}
     reference = inputs.get("velocity_ref_rad_s")
     for i in range(result.sizes["axis"]):

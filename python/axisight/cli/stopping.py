@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: the same end of a command, told apart by its exit status."""
+"""Stop a command at Ctrl-C and SIGTERM, in the same way except for the exit status."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ _asked: list[int] = []
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM: whoever handles Ctrl-C handles it too."""
+    """Raised at SIGTERM; a KeyboardInterrupt, so that every handler of Ctrl-C catches it too."""
 
 
 def listen() -> None:
-    """Raise KeyboardInterrupt at Ctrl-C and Terminated at SIGTERM, once; the second of either ends at once."""
+    """Raise KeyboardInterrupt at Ctrl-C and Terminated at SIGTERM; a second signal kills the process."""
     for number in (signal.SIGINT, signal.SIGTERM):
-        # What is ignored, as Ctrl-C is by a job in the background of a shell, stays ignored.
+        # An ignored signal stays ignored, such as Ctrl-C for a background job of a shell.
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _stop)
 
 
 def asked() -> int | None:
-    """Return the exit status of a command that was asked to stop, None of one that was not."""
+    """Return the exit status if a signal asked the command to stop, else None."""
     return 128 + _asked[0] if _asked else None
 
 
 def exit_status(stop: KeyboardInterrupt) -> int:
-    """Return 130 after Ctrl-C and 143 after SIGTERM, as shells have it."""
+    """Return 130 after Ctrl-C and 143 after SIGTERM, as shells do."""
     return 128 + (signal.SIGTERM if isinstance(stop, Terminated) else signal.SIGINT)
 
 

@@ -1,4 +1,4 @@
-"""One suggestion for a name that is not there: the nearest of those that an error lists, or of the files beside."""
+"""Suggest a name for an unknown one: the nearest of those in the error message, or of the files beside."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from axisight.arguments import nearest
 
-# As errors say it: names in quotes, those that there are with commas between.
+# In error messages the unknown name is quoted, and the known names are separated by commas.
 _QUOTED = r"['\"`](?P<got>[^'\"`]+)['\"`]"
 _KNOWN = r"(?P<known>[^:;'\"`()]+?)"
 _CHOICES = (
@@ -23,15 +23,15 @@ _FILES = (
     re.compile(r"No such file or directory: '(?P<path>[^']+)'"),
     re.compile(r"(?:^|file: )(?P<path>[^:]+): expected [^:]*, got nothing"),
 )
-# Longer texts are no list of names, and names longer than this nobody types.
+# Longer messages are cut, and larger folders searched in part only.
 _LONGEST = 20_000
 _MOST_FILES = 10_000
 
 
 def suggestion(message: str) -> str | None:
-    """Return the name that was meant where an error says that one is not there; None where none is near.
+    """Return the name that was probably meant, from an error message about an unknown name.
 
-    None too where the message makes a suggestion itself.
+    The result is None if no name is near, or if the message already has a suggestion.
     """
     message = message[:_LONGEST]
     if "did you mean" in message.lower():
@@ -49,7 +49,7 @@ def suggestion(message: str) -> str | None:
 
 
 def _file_beside(path: Path) -> str | None:
-    """Return the path of what is in the same folder under a name like it."""
+    """Return the path with the nearest name in the same folder; None without one."""
     try:
         if path.exists():
             return None

@@ -1,4 +1,4 @@
-"""A diagnosis in at most 25 lines of text: verdict, causes, gap by axis, findings that matter, next step."""
+"""Summarize a diagnosis in at most 25 lines: verdict, causes, gap by axis, main findings, next step."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from axisight.gap.intake.user_simulator import said
 from axisight.gap.verdict.headline import in_order
 
 MOST_LINES = 25
-"""Lines of a summary, with the lines that name the files written after it."""
-# Longer lines are hard to read; narrower screens fold the tables.
+"""Most lines of a summary, including the lines that name the files written after it."""
+# Longer lines are hard to read; on narrower screens tables would not fit.
 _WIDEST, _NARROWEST = 100, 60
-# Findings that rarely change what to do; they are told last.
+# Findings that rarely change what to do, so they come last.
 _MINOR = ("parameter_at_edge", "effect_within_scatter", "position_noise_large")
 _GROUPS = 2
 
 
 @dataclass(frozen=True)
 class _Detail:
-    """How much of each section is told, each at most so many rows; ``blanks``: empty lines between sections."""
+    """The most rows of each part of a summary; ``blanks``: whether empty lines separate the sections."""
 
     parameters: int = 99
     places: int = 2
@@ -37,7 +37,7 @@ class _Detail:
     blanks: bool = True
 
 
-# Tried in turn until the lines are few enough: what is lost first matters least.
+# Tried in turn until the summary is short enough, so the least important rows go first.
 _DETAILS = (
     _Detail(),
     _Detail(blanks=False),
@@ -56,8 +56,8 @@ def summary(
 ) -> list[str]:
     """Return the lines of a diagnosis for a screen of ``width`` columns, the verdict first.
 
-    ``given``: options of files that are written anyway, each with a line of its own later.
-    ``command``: what takes the options that are offered, where that is not the command that was just run.
+    ``given`` lists the output options in use. Each of them prints a line later, so the summary is shorter.
+    ``command`` is the command that takes the offered options, empty if it is the running one.
     """
     width = min(max(width, _NARROWEST), _WIDEST)
     most = MOST_LINES - len(given)
@@ -75,7 +75,10 @@ def summary(
 
 
 def next_steps(found: Diagnosis, given: Collection[str] = (), command: str = "") -> list[str]:
-    """Return what to do with a diagnosis, in sentences: no option that was ``given``, options of ``command``."""
+    """Return the next steps after a diagnosis as sentences, without the options that were ``given``.
+
+    Each offered option follows the text ``command``, the command that takes it; "" is the running command.
+    """
     out = [] if found.next_experiment is None else [found.next_experiment]
     offers = {
         "--next-experiment": "--next-experiment FOLDER designs the motions that tell the causes apart.",
@@ -123,7 +126,7 @@ def _causes(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
 
 
 def _cause(cause: Cause, most: int) -> list[tuple[str, ...]]:
-    """Return a row for each of the first parameters of a cause, its name in the first row."""
+    """Return a row for each of the first ``most`` parameters of a cause; the first row has its name."""
     rows = []
     for name, p in list(cause.parameters.items())[:most]:
         unit = cause.units.get(name, "1")
@@ -154,13 +157,13 @@ def _gaps(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
 
 
 def _excess(stages: Sequence[float]) -> float:
-    """Return the squared gap of an axis above its floor; what is no number comes first."""
+    """Return the squared gap of an axis above its floor; infinite for NaN, so that this axis comes first."""
     before, _, _, floor = stages
     return before**2 - floor**2 if math.isfinite(before) else math.inf
 
 
 def _basis(found: Diagnosis) -> list[str]:
-    """Return what the figures rest on where that was chosen, or is not the robot file alone."""
+    """Return how logs and simulator were compared, if that is not the default."""
     out = []
     cutoff_hz = found.provenance.get("cutoff_hz")
     if cutoff_hz is not None:
@@ -173,7 +176,7 @@ def _basis(found: Diagnosis) -> list[str]:
 
 
 def _places(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
-    """Return where the rest of the gap lies; only where causes leave something to find."""
+    """Return where the rest of the gap lies, only for the verdict unknown."""
     left = found.remainder
     if found.verdict != "unknown" or left is None:
         return []
@@ -218,7 +221,7 @@ _SECTIONS: tuple[Callable[[Diagnosis, int, _Detail], list[str]], ...] = (
 
 
 def _next(steps: Sequence[str], width: int, detail: _Detail) -> list[str]:
-    """Return the next steps, a line each where there is room."""
+    """Return the next steps, one per line if there is room."""
     steps = steps[: detail.steps]
     if not detail.blanks:
         return _folded(f"next: {' '.join(steps)}", width)
@@ -229,7 +232,7 @@ def _next(steps: Sequence[str], width: int, detail: _Detail) -> list[str]:
 
 
 def _share(x: float) -> str:
-    """Return a share in per cent without its sign, three digits."""
+    """Return a share [1] in percent with three digits, without the percent sign."""
     if not math.isfinite(x):
         return "-"
     return f">{100 * LARGEST:.0f}" if x > LARGEST else percent(x).removesuffix(" %")
@@ -240,12 +243,12 @@ def _folded(text: str, width: int, indent: str = "  ") -> list[str]:
 
 
 def _cut(text: str, width: int) -> str:
-    """Return a text on one line, cut between words where it is longer."""
+    """Return a text on one line, cut between words to ``width`` characters."""
     return textwrap.shorten(text, width, placeholder=" ...")
 
 
 def _columns(rows: Sequence[Sequence[str]], width: int, right: Collection[int] = ()) -> list[str]:
-    """Return rows as aligned columns; where they are too wide, the first cell stands on a line of its own."""
+    """Return rows as aligned columns; if they are too wide, the first cell gets a line of its own."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     alone = sum(widths) + 2 * len(widths) - 2 > width
     out = []

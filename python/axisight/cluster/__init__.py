@@ -1,4 +1,4 @@
-"""Work on a Dask cluster or on processes of this machine, for studies, fleets and the benchmark."""
+"""Parallel work on a Dask cluster or in processes, for studies, fleets and the benchmark."""
 
 from axisight.cluster.on_cluster import on_cluster
 

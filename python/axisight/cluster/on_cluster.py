@@ -13,7 +13,7 @@ from axisight.errors import AxisightError, BackendError, InputError
 T = TypeVar("T")
 
 _FETCH_S = 10.0
-"""Longest time to fetch one result from a worker [s]; it is asked for again after that."""
+"""Longest time to fetch one result from a worker [s], after which it is requested again."""
 _MOST_MISSES = 20
 
 
@@ -23,12 +23,13 @@ def on_cluster(
     scheduler: str | None,
     patience_s: float,
 ) -> Iterator[tuple[T, Any]]:
-    """Yield every task with its result, in whatever order they finish.
+    """Yield every task with its result, in the order in which they finish.
 
-    ``call`` makes of a task a function and its arguments, when there is room for it on the workers;
-    its results are sent whole. A worker that dies has its tasks computed elsewhere. ``scheduler``: an
-    address, or None for the current client. Raises BackendError when the scheduler cannot be
-    reached, or no worker has been there for ``patience_s`` seconds, and what a task raises.
+    ``call`` returns a function and its arguments for a task, when the workers have room for it. Workers
+    send results in full. Other workers repeat the tasks of a worker that dies. ``scheduler`` is an
+    address, or None for the current
+    client. Raises BackendError if the scheduler cannot be reached or has no worker for ``patience_s``
+    seconds, and the exceptions of tasks.
     """
     with _Cluster(scheduler, patience_s) as cluster:
         waiting = deque(tasks)
@@ -52,7 +53,7 @@ def on_cluster(
 
 
 class _Cluster:
-    """A Dask client that notices when nobody is left."""
+    """A Dask client that notices the loss of all workers."""
 
     def __init__(self, scheduler: str | None, patience_s: float) -> None:
         self._patience_s = patience_s
@@ -70,23 +71,23 @@ class _Cluster:
             self._client.close(timeout=2)
 
     def window(self) -> int:
-        """Return how many tasks to keep in flight: enough that no worker waits."""
+        """Return the number of tasks to keep submitted, enough that no worker waits."""
         return self._window
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        # A new key each time: Dask would otherwise hand back a forgotten result.
+        # Without a new key each time, Dask would return a forgotten result.
         return self._client.submit(function, *arguments, pure=False, retries=3)
 
     def finished(self, futures: list[Any]) -> list[Any]:
-        """Return the futures that are done, after a second at most."""
-        # Futures learn of their end by themselves; `distributed.wait` would need ours to be
-        # the default client of the process.
+        """Return the finished futures, after one second at most."""
+        # Polling works without `distributed.wait`, which needs ours to be the default client of the
+        # process.
         self._look()
         end = time.monotonic() + 1.0
         done: list[Any] = []
         while not done and time.monotonic() < end:
             time.sleep(0.005)
-            # A result that died with its worker is "lost" until another computes it again.
+            # The result of a dead worker is "lost" until another worker computes it again.
             done = [f for f in futures if f.done() and f.status != "lost"]
         return done
 
@@ -95,7 +96,7 @@ class _Cluster:
             self._client.cancel(futures, force=True)
 
     def _look(self) -> None:
-        """Ask for the workers, once a second."""
+        """Query the number of workers, once a second; raises BackendError without any for too long."""
         if time.monotonic() < self._next_look:
             return
         self._next_look = time.monotonic() + 1.0
@@ -117,7 +118,7 @@ class _Cluster:
 
 
 def _distributed() -> Any:
-    """Return the module of the optional extra."""
+    """Return the module ``distributed``; raises InputError if it is not installed."""
     try:
         return importlib.import_module("distributed")
     except ImportError:

@@ -1,4 +1,4 @@
-"""Work shared by processes of this machine that end with the work, however it ends."""
+"""Parallel work in processes of this machine, which end in any case when the work ends."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ B = TypeVar("B")
 
 
 def each_done(work: Callable[[A], B], items: Sequence[A], workers: int) -> Iterator[tuple[int, B]]:
-    """Yield the place of every item and what ``work``, a plain function, makes of it, as it is done.
+    """Yield the index of every item and the result of ``work``, in the order in which they finish.
 
-    Where the work stops half way, by Ctrl-C or an error of an item, the processes are ended.
+    ``work`` is a module-level function. Ctrl-C or an error of an item ends the processes.
     """
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin)
     try:
@@ -27,7 +27,7 @@ def each_done(work: Callable[[A], B], items: Sequence[A], workers: int) -> Itera
         for job in as_completed(jobs):
             yield jobs[job], job.result()
     except BaseException:
-        # Python 3.14 has a method for it; before, to shut down waits for what is being worked on.
+        # A shutdown would wait for items in progress; a method to end processes needs Python 3.14.
         for process in list((pool._processes or {}).values()):
             process.terminate()
         raise
@@ -37,11 +37,11 @@ def each_done(work: Callable[[A], B], items: Sequence[A], workers: int) -> Itera
 
 @contextmanager
 def _deaf_to_interrupts() -> Iterator[None]:
-    """Start processes here: Ctrl-C goes to all of a terminal, and only this one is to say something."""
+    """Make processes started here ignore Ctrl-C, so that only this process reports it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    # Inherited, from before the first import of a process on.
+    # Processes inherit the mask, so that it acts before their first import.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -50,7 +50,7 @@ def _deaf_to_interrupts() -> Iterator[None]:
 
 
 def _begin() -> None:
-    """End this process when the one that wants its work is gone, even killed."""
+    """End this process when its parent process ends, even if killed."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

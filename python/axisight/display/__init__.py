@@ -1,1 +1,1 @@
-"""What is shown of results in notebooks, and of work in progress anywhere."""
+"""Display results in terminals and notebooks, and show progress."""

@@ -1,4 +1,4 @@
-"""Progress: bars on a terminal, or in a notebook, for work that reports how far it is."""
+"""Progress bars in a terminal or a notebook, for functions that report their progress."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from axisight.display.html import lines
 
-# A notebook is sent the whole of what it shows each time.
+# Every update sends the whole output to the notebook.
 _AT_MOST_EVERY_S = 0.1
 _MOST_NOTES = 20
 
 
 class Counted(Protocol):
-    """State of a study: ``done`` of ``total`` runs, and a message of something out of the ordinary."""
+    """State of a study: ``done`` of ``total`` runs, and a message about unusual events."""
 
     @property
     def done(self) -> int:
-        """Runs that are finished."""
+        """Number of finished runs."""
 
     @property
     def total(self) -> int:
-        """Runs that there are to be."""
+        """Number of all runs."""
 
     @property
     def message(self) -> str:
-        """What is out of the ordinary, if anything."""
+        """Text about an unusual event; empty without one."""
 
 
 class Bars(ABC):
-    """A bar for each stage of work: to be called with what is done, how many are done, of how many."""
+    """Bars, one per stage of work; callers report (stage, done, total) by calling the object."""
 
     @abstractmethod
     def __call__(self, what: str, done: int, total: int) -> None:
-        """Show that ``done`` of ``total`` are done of ``what``."""
+        """Show that ``done`` of ``total`` steps of the stage ``what`` are finished."""
 
     def study(self, state: Counted) -> None:
         """Show the state that `axisight.montecarlo.run` reports."""
@@ -53,15 +53,15 @@ class Bars(ABC):
 
     @abstractmethod
     def note(self, text: str) -> None:
-        """Show a text above the bars, to stay."""
+        """Show a text above the bars permanently."""
 
 
 @contextmanager
 def progress_bars() -> Iterator[Bars]:
     """Show progress while the block runs: in a notebook below the cell, else on standard error.
 
-    ``with progress_bars() as bars: diagnose(case, progress=bars)``; for studies
-    ``montecarlo.run(study, progress=bars.study)``. In a notebook IPython alone is needed.
+    Example: ``with progress_bars() as bars: diagnose(case, progress=bars)``; for studies
+    ``montecarlo.run(study, progress=bars.study)``. A notebook needs IPython only, no widgets.
     """
     if _in_notebook():
         bars = _NotebookBars()
@@ -102,7 +102,7 @@ class _TerminalBars(Bars):
 
 
 class _NotebookBars(Bars):
-    """Bars of HTML, one display that is replaced: no widgets are needed."""
+    """Bars as HTML in one display that is updated, so that no widgets are needed."""
 
     def __init__(self) -> None:
         self._ipython = import_module("IPython.display")
@@ -122,7 +122,7 @@ class _NotebookBars(Bars):
         self.show()
 
     def show(self) -> None:
-        """Show what is known now."""
+        """Show the current notes and bars."""
         if not (self._stages or self._notes):
             return
         self._shown_s = time.monotonic()
@@ -143,8 +143,8 @@ def _bar(what: str, done: int, total: int) -> str:
 
 
 def _in_notebook() -> bool:
-    """Whether this runs in a kernel of Jupyter, and not in a terminal."""
+    """Whether this process is a Jupyter kernel, not a terminal."""
     ipython = sys.modules.get("IPython")
     get = getattr(ipython, "get_ipython", lambda: None)
-    # That of a hosted notebook is a class of its own, made of it.
+    # Hosted notebooks use subclasses of this shell.
     return any(kind.__name__ == "ZMQInteractiveShell" for kind in type(get()).__mro__)

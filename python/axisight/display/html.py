@@ -1,4 +1,4 @@
-"""Tables in HTML for notebooks: every text escaped, nothing fetched, no script, no style of their own."""
+"""HTML tables for notebooks, with all text escaped, and without scripts, styles or external resources."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _LONGEST = 500
 
 
 def page(title: str, *parts: str) -> str:
-    """Return a heading, which is escaped, above parts that are HTML."""
+    """Return a heading, escaped, above parts that are HTML already."""
     return f"<div><p><strong>{_text(title)}</strong></p>{''.join(parts)}</div>"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
-    """Return a table of texts below its caption; of very many rows the first, and a row that says so."""
+    """Return a table of texts below its caption; after 60 rows, one row states the number of the others."""
     rows = iter(rows)
     shown = [_row("td", row) for row in islice(rows, _MOST_ROWS)]
     more = sum(1 for _ in rows)
@@ -34,19 +34,19 @@ def values(
     std: Iterable[float],
     units: Sequence[str] | None = None,
 ) -> str:
-    """Return a table of parameters with standard errors, and units where they are known."""
+    """Return a table of parameters with standard errors, and with units if they are given."""
     rows = zip(names, map(number, found), map(number, std), units or [""] * len(names), strict=True)
     head = ("parameter", "value", "standard error", *(["unit"] if units else []))
     return table(head, (row[: len(head)] for row in rows), "Parameters with standard errors")
 
 
 def lines(texts: Iterable[str]) -> str:
-    """Return a paragraph a text."""
+    """Return one paragraph per text."""
     return "".join(f"<p>{_text(text)}</p>" for text in texts)
 
 
 def number(value: float) -> str:
-    """Return a number in four digits."""
+    """Return a number with four significant digits."""
     return f"{value:.4g}"
 
 

@@ -1,6 +1,6 @@
-"""What results show of themselves: a few lines in a terminal, a table in a notebook.
+"""Short representations of results: a few lines in a terminal, a table in a notebook.
 
-Numbers have four digits and their units, arrays their shape and range. Nothing here computes.
+Numbers are shown with four digits and their units, arrays with their shape and range.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ T = TypeVar("T", bound=type)
 
 MOST = 7
 """Entries of a table, or of a list of results, that a repr shows."""
-# Lines of a result in a terminal; entries of an array that are shown one by one; words of a list.
+# Most lines of a result in a terminal, entries of an array shown one by one, and items of a list.
 _MOST_LINES = 24
 _MOST_NUMBERS = 6
 _MOST_WORDS = 4
 _LONGEST = 100
 _INSIDE = 60
-# Ends of names, longest first, and the unit that they say.
+# Suffix of a field name -> unit; longer suffixes come first.
 _UNITS = (
     ("kg_m2", "kg m^2"),
     ("nm_s_rad", "Nm s/rad"),
@@ -47,17 +47,17 @@ _UNITS = (
     ("s", "s"),
     ("m", "m"),
 )
-# Words before the unit's end that say what the number is, not in which unit.
+# Words after the unit at the end of a name, which do not change the unit.
 _LONG = re.compile(r"_(?:std|rms|per_axis)$")
 
 
 def summarized(kind: T) -> T:
-    """Give a dataclass a short repr and a table for notebooks, made of its fields.
+    """Return the dataclass ``kind`` with a short repr and a table for notebooks, made from its fields.
 
-    Fields with ``repr=False`` are left out. Where the class has parameters (``names`` or ``free``, with ``values``
-    and ``std`` or ``standard_error``), these come first, with standard errors. A class keeps a
-    `_repr_html_` and a ``__str__`` of its own. A method ``_summary`` that returns a title and rows of
-    (name, text) takes the place of the fields in the repr. What fits stands on one line.
+    Fields with ``repr=False`` are left out. If the class has parameters (``names`` or ``free``, with
+    ``values`` and ``std`` or ``standard_error``), these come first, with standard errors. A class keeps its
+    own `_repr_html_` and ``__str__``. If it has a method ``_summary`` that returns a title and rows of
+    (name, text), the repr shows these in place of the fields. A short repr takes one line.
     """
     kind.__repr__ = _text  # type: ignore[assignment]
     if "_repr_html_" not in kind.__dict__:
@@ -66,7 +66,7 @@ def summarized(kind: T) -> T:
 
 
 def _text(self: object) -> str:
-    """Return the fields in one line or in a few."""
+    """Return the repr: the fields in one line if they fit, else one line per field."""
     title, rows = type(self).__name__, None
     if (own := getattr(self, "_summary", None)) is not None:
         title, rows = own()
@@ -81,14 +81,14 @@ def _text(self: object) -> str:
 
 
 def _line(thing: object, most: int) -> str:
-    """Return the fields in one line of at most ``most`` characters; nothing where that is too short."""
+    """Return the fields in one line of at most ``most`` characters; "" if they do not fit."""
     shown = ", ".join(f"{key}={shortened(value, key)}" for key, value in _fields(thing))
     line = f"{type(thing).__name__}({shown})"
     return line if len(line) <= most else ""
 
 
 def _html(self: object) -> str:
-    """Return the fields, and the parameters where there are some, as tables."""
+    """Return the fields, and the parameters if there are any, as HTML tables."""
     name = type(self).__name__
     parameters = _parameters(self)
     left_out = set() if parameters is None else {"names", "free", "values", "std", "standard_error"}
@@ -100,7 +100,7 @@ def _html(self: object) -> str:
 
 
 def _rows(thing: object) -> list[tuple[str, str]]:
-    """Return names and texts: parameters with standard errors first, then the other fields."""
+    """Return (name, text) rows: parameters with standard errors first, then the other fields."""
     parameters = _parameters(thing)
     if parameters is None:
         return [(key, shortened(value, key)) for key, value in _fields(thing)]
@@ -118,7 +118,7 @@ def _rows(thing: object) -> list[tuple[str, str]]:
 
 
 def _fields(thing: object) -> list[tuple[str, Any]]:
-    """Return the fields of a dataclass that are to be shown, but those that are None."""
+    """Return the fields of a dataclass to show: those with repr that are neither None nor empty text."""
     if not is_dataclass(thing):
         return []
     shown = [(f.name, getattr(thing, f.name)) for f in fields(thing) if f.repr]
@@ -130,7 +130,7 @@ def _is_empty_text(value: object) -> bool:
 
 
 def _parameters(thing: object) -> tuple[Sequence[str], Sequence[float], Sequence[float]] | None:
-    """Return names, values and standard errors of a result that has them."""
+    """Return names, values and standard errors of a result; None if it lacks them."""
     names = getattr(thing, "free", getattr(thing, "names", None))
     values = getattr(thing, "values", None)
     errors = getattr(thing, "standard_error", getattr(thing, "std", None))
@@ -143,7 +143,7 @@ def _parameters(thing: object) -> tuple[Sequence[str], Sequence[float], Sequence
 
 
 def shortened(value: object, name: str = "") -> str:
-    """Return a value in a few words; the end of its ``name`` says the unit of a number."""
+    """Return a value in a few words, with the unit that the suffix of its ``name`` states."""
     text = _worded(value)
     unit = _unit(name) if _is_numeric(value) else ""
     return f"{text} {unit}".rstrip()
@@ -174,7 +174,7 @@ def _worded(value: object) -> str:  # noqa: PLR0911 one line a kind
         return _cut(str(value))
     if isinstance(value, np.ndarray):
         return _array(value)
-    # Tables of xarray and pandas, which are not loaded for this.
+    # Tables of xarray and pandas by their attributes, so that neither library must be imported.
     if isinstance(sizes := getattr(value, "sizes", None), Mapping):
         listed = ", ".join(f"{dim}: {size}" for dim, size in sizes.items())
         return f"{type(value).__name__} ({listed})"
@@ -189,7 +189,7 @@ def _worded(value: object) -> str:  # noqa: PLR0911 one line a kind
 
 
 def _item(value: object) -> str:
-    """Return what is said of a value inside another one: of a result its kind, or what it says in words."""
+    """Return text for a value inside another one; for a result, its own words, its fields or its type."""
     if isinstance(value, str | PurePath | bool | int | float | complex | np.generic | np.ndarray):
         return _worded(value)
     if isinstance(value, tuple | list | Mapping):
@@ -229,7 +229,7 @@ def _array(value: np.ndarray[Any, Any]) -> str:
 
 
 def _list(first: Sequence[str], count: int) -> str:
-    """Return the first of several texts, and how many more there are."""
+    """Return the first texts joined by commas, and the number of the others."""
     more = f", and {count - len(first)} more" if count > len(first) else ""
     return _cut(", ".join(first)) + more if first else "none"
 

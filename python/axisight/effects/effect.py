@@ -1,4 +1,4 @@
-"""An effect at work: its name, its place, its parameters."""
+"""An `Effect`: its name, its place, its parameters."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ EffectTuple = tuple[str, int | tuple[int, int] | None, list[float]]
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class Effect:
-    """An effect at work.
+    """One effect: its name, its place and the values of its parameters.
 
     Parameters
     ----------
-    name : one of `effect_table`.
+    name : a name of `effect_table`.
     axis : the driven axis, from 1, or the name of its joint; None for effects of the whole arm.
-    parameters : values by name; those left out take their neutral value.
+    parameters : values by name, in the units of `effect_table`; those left out take their neutral value.
     axes : the two axes of an effect between axes, as numbers or joint names.
-    joints : what `axis` or `axes` said where that was a joint name. `Robot.placed` puts numbers in its
-        place, and so does every call that has a robot. Not to be given.
+    joints : the joint names that `axis` or `axes` gave. `Robot.placed`, and every call that has a robot,
+        replaces them by numbers. Do not pass it yourself.
 
-    Effects are equal if they have the same name, place and values. Raises InputError for an unknown
-    effect or parameter, for a value that is no number, and for a place that the effect cannot have.
+    Effects are equal if they have the same name, place and values. Raises InputError for an unknown effect or
+    parameter, for a value that is not a number, and for a place that the effect cannot have.
 
     """
 
@@ -48,7 +48,7 @@ class Effect:
         axes: Sequence[int | str] | NDArray[np.integer[Any]] | None = None,
         joints: Sequence[int | str] = (),
     ) -> None:
-        """Refuse unknown names and impossible axes early."""
+        """Raise InputError for an unknown name, an impossible place or a wrong parameter."""
         info = effect_info(name)
         if axis is not None and info.scope == "axes":
             raise InputError(
@@ -69,7 +69,7 @@ class Effect:
             object.__setattr__(self, field, value)
 
     def __repr__(self) -> str:
-        """Return the call that makes it."""
+        """Return the call that makes this effect."""
         place = self.joints[0] if len(self.joints) == 1 else self.axis
         values = {name: float(f"{value:.6g}") for name, value in (self.parameters or {}).items()}
         parts = [repr(self.name), *([] if place is None else [repr(place)])]
@@ -81,7 +81,7 @@ class Effect:
 
     @property
     def label(self) -> str:
-        """``effect@axis`` or ``effect@5,6``; the effect alone when it belongs to the whole arm."""
+        """Label ``effect@axis`` or ``effect@5,6``; the name alone for an effect of the whole arm."""
         if self.joints:
             return f"{self.name}@{','.join(map(str, self.joints))}"
         if self.axes is not None:
@@ -90,7 +90,7 @@ class Effect:
 
     @property
     def place(self) -> int | tuple[int, int] | None:
-        """Axis, axes, or None for the whole arm; raises InputError for joint names without their robot."""
+        """Axis (from 1), two axes, or None for the whole arm; raises InputError for joint names."""
         if self.joints:
             named = ", ".join(str(joint) for joint in self.joints)
             raise InputError(
@@ -105,7 +105,7 @@ class Effect:
         return self.axis if self.axes is None else self.axes[0]
 
     def acts_on(self, axis: int) -> bool:
-        """Whether it belongs to an axis (from 1), alone, with another one or with the whole arm."""
+        """Return whether the effect acts on an axis (from 1), alone or with other axes."""
         return self.place is None or axis in (self.axis, *(self.axes or ()))
 
     def with_values(self, values: Mapping[str, float]) -> Effect:
@@ -113,18 +113,18 @@ class Effect:
         return replace(self, parameters={**(self.parameters or {}), **values})
 
     def __eq__(self, other: object) -> bool:
-        """Compare name, place and values."""
+        """Return whether name, place and values are the same."""
         if not isinstance(other, Effect):
             return NotImplemented
         return (self.label, self.values()) == (other.label, other.values())
 
     def __hash__(self) -> int:
-        """Agree with equality."""
+        """Return a hash of name, place and values: equal effects have equal hashes."""
         return hash((self.label, *self.values()))
 
     @property
     def acts(self) -> bool:
-        """Whether any amplitude is off its neutral value: otherwise the effect changes nothing."""
+        """Whether any amplitude differs from its neutral value; without one the effect changes nothing."""
         given = self.parameters or {}
         return any(
             given.get(p.name, p.neutral) != p.neutral
@@ -170,7 +170,7 @@ def _two_axes(
 
 
 def _check_parameters(info: EffectInfo, parameters: object) -> None:
-    """Raise InputError for what is no mapping, an unknown parameter, and a value that is no number."""
+    """Raise InputError unless the parameters are a mapping of known names to numbers."""
     if parameters is None:
         return
     known = [p.name for p in info.parameters]
@@ -191,12 +191,12 @@ def _check_parameters(info: EffectInfo, parameters: object) -> None:
 
 
 def core_effects(effects: Iterable[Effect]) -> list[EffectTuple]:
-    """Return effects as the compiled core takes them."""
+    """Return effects as the tuples that the compiled core takes."""
     return [(e.name, e.place, e.values()) for e in effects]
 
 
 def effect_of_core(effect: EffectTuple) -> Effect:
-    """Return an effect that the compiled core tells of, with all its parameters."""
+    """Return the effect that a tuple of the compiled core describes, with all its parameters."""
     name, place, values = effect
     names = (p.name for p in effect_info(name).parameters)
     parameters = dict(zip(names, values, strict=True))

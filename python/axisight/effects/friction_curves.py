@@ -1,4 +1,4 @@
-"""Laws of friction at steady speed, by the equations of the table."""
+"""Friction laws at steady speed, by the equations of the effect table."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from axisight.effects.effect import Effect
 
 Array = NDArray[np.float64]
 Curve = Callable[[Array, Mapping[str, float]], Array]
-# Speeds that are looked at, of the one over which friction falls.
+# Speeds at which the rise is looked for, relative to the Stribeck speed.
 _LOOKED_AT = np.geomspace(1e-3, 10.0, 200)
 
 
@@ -21,13 +21,13 @@ def _falling(v: Array, p: Mapping[str, float]) -> Array:
 
 
 CURVES: Mapping[str, Curve] = {"stribeck_friction": _falling}
-"""Torque [Nm] by speed of the motor [rad/s] and parameters, of laws that rise towards standstill."""
+"""Friction [Nm] by motor speed [rad/s] and parameters, for laws that rise towards standstill."""
 
 
 def rise_over_high_speed(effect: Effect) -> float:
-    """Return by how much friction is at most larger than at high speed, of that [1].
+    """Return the largest rise of friction above its high-speed value, as a share of that value [1].
 
-    Infinite where there is none at high speed.
+    Infinite if friction vanishes at high speed and not below it.
     """
     values = effect.parameters or {}
     dry, excess = values["coulomb_nm"], values["excess_nm"]

@@ -1,4 +1,4 @@
-"""Laws of gears at rest: torque over deflection, by the equations of the table, corners of play and knee sharp."""
+"""Static gear laws: torque over deflection by the equations of the effect table, with sharp corners."""
 
 from __future__ import annotations
 
@@ -43,4 +43,4 @@ CURVES: Mapping[str, Curve] = {
     "nonlinear_stiffness": _cube,
     "joint_stiffness": _spring,
 }
-"""Torque over stiffness [rad] by deflection [rad], parameters and stiffness [Nm/rad], by effect."""
+"""Torque divided by stiffness [rad] by deflection [rad], parameters and stiffness [Nm/rad]; keys: effects."""

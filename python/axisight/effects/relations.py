@@ -14,11 +14,13 @@ FORMULA_KINDS: tuple[FormulaKind, ...] = get_args(FormulaKind)
 class Formula:
     """How much two accepted formulas of an effect differ.
 
-    - ``error``: as a share of what the effect explains [1]. Effects of one ``kind`` are compared with this error.
-    - ``held``: when it applies: always, or if an effect of the kind leaves little more than noise, or almost nothing.
+    - ``kind``: effects of one kind are compared with the same ``error``.
+    - ``error``: difference as a share of what the effect explains [1].
+    - ``held``: when the error applies: always, or if an effect of the kind leaves little more than noise, or
+      almost nothing.
     - ``white``: whether the true effect leaves a white residual.
-    - ``value_error``: standard deviation of a parameter between formulas, relative to its size [1]; ``of_each``:
-      whether it grows with the number of fitted parameters.
+    - ``value_error``: standard deviation of a parameter between formulas, relative to its size [1].
+    - ``of_each``: whether ``value_error`` grows with the number of fitted parameters.
     """
 
     kind: FormulaKind | None
@@ -34,16 +36,19 @@ class Formula:
         return self.kind == "exact"
 
     def spread(self, free: int) -> float:
-        """Return the relative standard deviation of a parameter between formulas [1], with ``free`` fitted ones."""
+        """Return the relative standard deviation of a parameter between formulas [1].
+
+        ``free`` is the number of fitted parameters.
+        """
         return self.value_error * free if self.of_each else self.value_error
 
 
 @dataclass(frozen=True)
 class Plainer:
-    """The plainer ``law`` that an effect contains, and the parameters that it ``adds`` to that law.
+    """The plainer ``law`` that an effect contains, and the parameters that the effect ``adds`` to that law.
 
-    If the logs do not show the added parameters, the plainer law is ``likelier`` by this factor. ``shown``: how they
-    show, by their standard errors or by friction that rises at low speed.
+    If the logs do not show the added parameters, the plainer law is ``likelier`` by this factor. ``shown``
+    says how the logs show them: by their standard errors, or by friction that rises at low speed.
     """
 
     law: str
@@ -59,10 +64,10 @@ class Plainer:
 
 @dataclass(frozen=True)
 class Resembles:
-    """An effect ``law`` with one parameter, which another effect equals at some values ``shape`` of its parameters.
+    """An effect ``law`` with one parameter, which a second effect equals at the values ``shape``.
 
-    The parameter of ``law`` is ``ratio`` times ``size``. If both describe a machine equally well, the other effect is
-    ``rarer`` by this factor.
+    The parameter of ``law`` is ``ratio`` times the parameter ``size`` of the second effect. If both describe
+    a machine equally well, the second effect is ``rarer`` by this factor.
     """
 
     law: str
@@ -72,13 +77,13 @@ class Resembles:
     rarer: float
 
     def values(self, of_law: float) -> dict[str, float]:
-        """Return the parameters at which the effect equals ``law`` with this parameter."""
+        """Return the parameters at which the second effect equals ``law`` with the parameter ``of_law``."""
         return {self.size: of_law / self.ratio, **self.shape}
 
 
 @dataclass(frozen=True)
 class BegunFrom:
-    """A ``law`` whose fit is a start for this effect, and which parameters take which of its values."""
+    """A ``law`` whose fit starts this effect's fit; ``takes`` maps parameters to those of the law."""
 
     law: str
     takes: Mapping[str, str]
@@ -86,10 +91,10 @@ class BegunFrom:
 
 @dataclass(frozen=True)
 class Later:
-    """Parameters of a law that are fitted in a second step, from where its fit without them ended.
+    """Parameters of a law that are fitted in a second step, after the fit without them.
 
-    The ``amplitude`` starts at ``begin``, with ``most`` as its upper bound. The ``shape`` starts like that of the
-    effect ``as_of``.
+    The ``amplitude`` starts at ``begin``, with ``most`` as its upper bound. The ``shape`` starts like that of
+    the effect ``as_of``.
     """
 
     amplitude: str
@@ -103,8 +108,8 @@ class Later:
 class SpringChange:
     """How a law changes the spring of a gear.
 
-    ``sums``: parameters whose sums are the relative changes of stiffness [1], in the middle first;
-    ``without_middle``: the law of a gear without stiffness in its middle.
+    ``sums``: parameters whose sums are the relative changes of stiffness [1], from the middle outwards.
+    ``without_middle``: name of the law for a gear without stiffness in its middle.
     """
 
     sums: tuple[tuple[str, ...], ...]

@@ -1,6 +1,6 @@
-"""Which effects state what was identified, and where its numbers stand in them.
+"""Which effects state an identified quantity, and in which of their parameters.
 
-Fits have parameters of their own; robot files have effects. The one place that knows both.
+Fits have parameters of their own, robot files have effects. Only this module knows both.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 class Stated:
     """An effect that states fitted parameters.
 
-    ``places`` maps the names of the fit to parameters of the effect; ``shape`` are values that the
-    fit does not have.
+    ``places`` maps names of the fit to parameters of the effect. ``shape`` holds values that the fit does not
+    have.
     """
 
     name: str
@@ -30,13 +30,17 @@ class Stated:
 
 
 MOST_RIPPLES = 3
-"""Harmonics that a stated torque ripple holds."""
+"""Most harmonics in a stated torque ripple."""
 
 
 def of_axis_fit(
     *, stribeck: bool, ripple_orders: Sequence[float], smoothing_rad_s: float
 ) -> list[Stated]:
-    """Return the effects that state the fit of one axis, by its thesis names (chapter 9)."""
+    """Return the effects that state the fit of one axis, with the parameter names of thesis chapter 9.
+
+    ``ripple_orders`` [1/turn]: only the first `MOST_RIPPLES` are stated. ``smoothing_rad_s``: corner of dry
+    friction.
+    """
     friction = {"F_c": "coulomb_nm"}
     kind = "coulomb_friction"
     if stribeck:
@@ -56,20 +60,21 @@ def of_axis_fit(
 
 RIGID_BODY_TERMS = {
     "coulomb_friction": ("coulomb_friction", "coulomb_nm", 1.0),
-    # A torque model needs the term from its motor, the effect gives it to the motor.
+    # A torque model subtracts the offset from the motor's torque, the effect adds it: hence the sign.
     "torque_offset": ("torque_offset", "offset_nm", -1.0),
 }
-"""Terms of a torque model that the robot has no parameter for: effect, its parameter and sign."""
+"""Terms of a torque model that are no parameter of the robot: effect, parameter of the effect, sign."""
 
 _CORNER_SHARE = 0.003
 _MOTOR_CORNER_RAD_S = 0.1
 
 
 def friction_corner(top_speed: Array) -> Array:
-    """Return over which speeds (n_axes,) the sign in dry friction is smoothed, from the largest seen.
+    """Return the speeds (n_axes,) that smooth the sign in dry friction, from the largest ``top_speed``.
 
-    Narrow enough for hardly a sample to lie in it, wide enough to be integrated; at most the usual
-    corner of motors, which is too wide for a slide or for speeds on the side of the joints.
+    The result has the unit of ``top_speed`` (motor side [rad/s]). It is narrow, so that few samples lie
+    inside, and wide enough to be integrated. Its upper limit is the usual corner of motors, which would be
+    too wide for a slide or for joint-side speeds.
     """
     return np.asarray(np.minimum(_CORNER_SHARE * np.asarray(top_speed), _MOTOR_CORNER_RAD_S))
 
@@ -80,33 +85,33 @@ RIGID_BODY_QUANTITIES = {
     "coulomb_friction": "dry_friction",
     "torque_offset": "torque_offset",
 }
-"""Terms of a torque model by what they take up of effects that the robot has."""
+"""Terms of a torque model, and the name under which effects state that the term absorbs them."""
 
 DRY_FRICTION = ("coulomb_friction", "coulomb_nm", "smoothing_rad_s")
-"""What the dry friction of a joint in a model file is, its moment and its corner: of the motor."""
+"""Dry friction of a joint in a model file: effect, its torque and its corner, both on the motor side."""
 
 BEHIND_GEAR = "arm_share"
-"""Which share of a friction the arm feels, behind an elastic gear: a parameter of friction laws without a memory."""
+"""Parameter of friction laws without memory: the share that acts on the arm, behind an elastic gear."""
 
 BRISTLES = ("presliding_friction", "presliding_rad", "relaxation_s")
-"""What dry friction is that yields before it slips, over which way, and how fast it may slip in fits.
+"""Dry friction that yields before it slips: effect, displacement before slip, relaxation time in fits.
 
-In torque that is predicted from motion it slips all the time, and is dry friction.
+In torque predicted from motion this friction always slips, and equals dry friction.
 """
 
 VISCOUS_FRICTION = "viscous_friction"
-"""What friction in proportion to speed is, beyond the simulator's."""
+"""Friction proportional to speed, beyond the simulator's own."""
 
 ROTOR = "rotor_inertia"
-"""What the inertia of a motor is that a model file leaves out."""
+"""Motor inertia that a model file leaves out."""
 
 MOTOR_INERTIA = "motor_inertia"
-"""What a rotor is that is heavier or lighter than the simulator's."""
+"""Change of the simulator's motor inertia."""
 
 LINK_MASS, LINK_COM, LINK_INERTIA, LOAD = "link_mass", "link_com", "link_inertia", "payload"
-"""What a link is whose mass [1], centre of mass [m] or inertia [1] is another, and a load on the last link.
+"""A change of a link's mass [1], centre of mass [m] or inertia [1], and a load on the last link.
 
-Parameters: the relative change; the shift in the frame of the link; mass [kg] and place.
+Parameters of the load: mass [kg] and position. The centre of mass shifts in the frame of the link.
 """
 
 LINK_GEOMETRY, JOINT_ZERO, BASE_TILT = (
@@ -114,49 +119,49 @@ LINK_GEOMETRY, JOINT_ZERO, BASE_TILT = (
     ("joint_zero_offset", "offset_rad"),
     "base_tilt",
 )
-"""What an axis is that lies elsewhere in the link before it, an encoder with another zero, a tilted base.
+"""An axis with another position in the link before it, an encoder with another zero, a tilted base.
 
-Parameters: the shift in the frame of the link; its own; angles about x and y.
+Parameters: shift in the frame of the link, offset of the zero, angles about x and y.
 """
 
 JOINT_SPRING = ("cable_stiffness", "stiffness_nm_rad", "at_zero_nm")
-"""What a spring of a joint is: its stiffness, and its torque where the joint is at zero."""
+"""Spring on a joint: effect, its stiffness, its torque where the joint is at zero."""
 
 LAG = ("actuator_bandwidth", "time_constant_s")
-"""What a drive that follows its command with a first-order lag is, and its parameter."""
+"""Drive that follows its command with a first-order lag: effect and parameter."""
 
 TRANSPORT_DELAY = ("input_delay", "delay_s")
-"""What a drive that acts late is, and its parameter."""
+"""Drive that acts late: effect and parameter."""
 
 TORQUE_LIMIT = ("torque_saturation", "limit_nm")
-"""What flat tops of a logged torque are, and its parameter."""
+"""Limit of the torque, which gives logged torque flat tops: effect and parameter."""
 
 OTHER_GAINS = ("controller_gain", ("relative_proportional", "relative_integral"))
-"""What a controller with other gains is, and its parameters: of the proportional, of the integral gain."""
+"""Controller with other gains: effect, parameters of the proportional and of the integral gain."""
 
 GAIN_OF_POSITION = (OTHER_GAINS[0], "relative_position")
-"""The same of the position loop of a cascade, and its parameter."""
+"""Cascade with another gain of the position loop: effect and parameter."""
 
 SPEED_FILTER = ("velocity_filter", "time_constant_s")
-"""What a filter on the controller's speed is, and its parameter."""
+"""Filter on the controller's speed: effect and parameter."""
 
 FEEDFORWARD = ("feedforward_missing", ("acceleration_nm_s2_rad", "speed_nm_s_rad"))
-"""What torque fed forward is, and its parameters: for the rate of the reference, for the reference."""
+"""Torque feedforward: effect, parameters for the rate of the speed reference and for the reference itself."""
 
 CLOCK = ("clock_drift", "relative_rate")
-"""What a clock of its own is, and its parameter."""
+"""Clock that differs from the references': effect and parameter."""
 
 STEPS = ("position_quantization", "increment_rad")
-"""What an encoder of few lines is, and its parameter."""
+"""Encoder with few lines: effect and parameter."""
 
 TORQUE_CONSTANT = ("torque_constant", "relative_error")
-"""What a motor with another torque constant is, and its parameter."""
+"""Motor with another torque constant: effect and parameter."""
 
 TORQUE_SENSOR = ("torque_sensor_gain", "relative_error")
-"""What a torque that is reported too large or too small is, and its parameter."""
+"""Torque that is reported too large or too small: effect and parameter."""
 
 PLAY = ("backlash", "damped")
-"""What a gear has whose middle is without stiffness, and its parameter for what is damped there."""
+"""Gear without stiffness in its middle: effect, parameter for the damping there."""
 
 WITH_MEMORY = frozenset(
     {
@@ -168,7 +173,7 @@ WITH_MEMORY = frozenset(
         "current_loop",
     }
 )
-"""Effects on motors and joints whose torque hangs on what was before."""
+"""Effects on motors and joints whose torque depends on the past."""
 
 DEMONSTRATION = Effect("coulomb_friction", 2, {"coulomb_nm": 0.6, "smoothing_rad_s": 0.08})
-"""What the machine of the demonstration has and its simulator has not."""
+"""The effect that the machine of the demonstration has and its simulator lacks."""

@@ -1,4 +1,4 @@
-"""The table of effects: all that is known of each, as the compiled core states it."""
+"""The table of effects: everything known about each, as the compiled core states it."""
 
 from __future__ import annotations
 
@@ -18,10 +18,14 @@ from axisight.effects.relations import BegunFrom, Formula, Later, Plainer, Resem
 from axisight.errors import InputError
 
 Mark = Literal["optional", "place", "notation", "fastest_time", "shows_inverse", "held_first"]
-"""What else is to be known of a parameter.
+"""Marks of a parameter.
 
-It may be idle, of several; it says where an effect acts and is no number of it; it is how somebody writes a law; a
-time [s] that fixed steps follow no less than one of; its inverse is what shows; it is held in first fits.
+- ``optional``: may be idle, as one wave or one coordinate of several.
+- ``place``: says where the effect acts; it does not count as a number of the effect.
+- ``notation``: belongs to a way of writing the law, not to the machine.
+- ``fastest_time``: the shortest time [s] in which the effect changes; fixed steps must not be longer.
+- ``shows_inverse``: a small change shows as a change of the inverse, as stiffness does by compliance.
+- ``held_first``: held at its neutral value in first fits.
 """
 
 
@@ -30,11 +34,13 @@ time [s] that fixed steps follow no less than one of; its inverse is what shows;
 class EffectParameter:
     """One parameter of an effect.
 
-    ``role``: the effect vanishes when every ``"amplitude"`` is at its neutral
-    value; a ``"shape"`` may then be anything. ``lower`` and ``upper`` bound the
-    value, ``typical`` is its natural scale; all in ``unit``. ``prior``, with the standard deviation ``spread`` of
-    a logarithm [1]: how values are spread over machines (`log_prior`), ``sizes`` what that rests on.
-    ``marks``: what else is to be known of it.
+    - ``role``: the effect vanishes if every ``"amplitude"`` is at its neutral value; a ``"shape"`` may then
+      have any.
+    - ``lower``, ``upper``, ``typical``: bounds and natural scale, in ``unit``.
+    - ``prior``: distribution of the values over machines (`log_prior`).
+    - ``spread``: standard deviation of the logarithm in a log-normal prior [1].
+    - ``sizes``: the source of ``typical`` and ``spread``.
+    - ``marks``: see `Mark`.
     """
 
     name: str
@@ -50,9 +56,10 @@ class EffectParameter:
     marks: tuple[Mark, ...]
 
     def log_prior(self, value: float) -> float:
-        """Return the logarithm of the density of a value over machines, of one a unit.
+        """Return the log-density of a value over machines, per ``unit``.
 
-        Minus infinity beyond the bounds, where there is no such effect, and of none where some is for sure.
+        ``value`` is in ``unit``. The density is that of machines which have the effect, and integrates to 1
+        within the bounds. Returns minus infinity outside them.
         """
         bounds = self.lower, self.upper
         if not self.lower <= value <= self.upper:
@@ -67,22 +74,28 @@ class EffectParameter:
 @summarized
 @dataclass(frozen=True)
 class EffectInfo:
-    """Description of an effect: equation and symbols as in the source it names.
+    """Description of an effect; equation and symbols are those of its ``source``.
 
-    ``family`` is the kind of cause. ``contains`` names the effects that this one becomes at some
-    value of its parameters, ``parts`` simpler ones that together do what it does. ``usual``: effects
-    met more often that this one looks like where speed, load or pose hardly change, ``usual_odds`` how many times
-    as often this one is met, where it is the usual one. ``twins``: effects of
-    which a machine gives the very same logs of commands and motor angles, ``twins_alone``: of an axis alone.
-    ``resembles``, ``plainer``, ``begun_from``, ``later``, ``formula``, ``spring``: `axisight.effects.relations`.
-    ``law_of``: what it is a law of, if an axis has one of that. ``scales``: whose torques it changes as another
-    unit of torque would, its own, those of all that carries its axis, or every axis'.
-    ``stands_for``: quantity of the robot's joint that the effect changes, and whether its first
-    parameter is the change itself or a share. ``linear``: how a linear model holds it.
-    ``inverse_dynamics``: whether torque predicted from measured motion can hold it; ``beside``: causes of its axis
-    without which that does not show it for sure. ``unrepeatable``: no two runs repeat what it does, it is noise.
-    ``absorbed_by``: identified quantities that it is part of. ``shown_by``: experiments that tell it from
-    others, the best first.
+    - ``family``: the kind of cause.
+    - ``contains``: effects that this one becomes at some value of its parameters.
+    - ``parts``: simpler effects that together do the same.
+    - ``usual``: more common effects that look like this one if speed, load or pose hardly change.
+    - ``usual_odds``: how many times as common this effect is as one that lists it in ``usual`` [1].
+    - ``twins``: effects that give the same logs of commands and motor angles; ``twins_alone``: only on an arm
+      of one axis.
+    - ``resembles``, ``plainer``, ``begun_from``, ``later``, ``formula``, ``spring``: see
+      `axisight.effects.relations`.
+    - ``law_of``: the part that this is a law of, if an axis has only one law of that part.
+    - ``scales``: torques that the effect scales like a change of torque unit: its own axis, all axes that
+      carry it, or every axis.
+    - ``stands_for``: quantity of the robot's joint that the effect changes; the first parameter is the
+      change, absolute or relative.
+    - ``linear``: how a linear model includes the effect.
+    - ``inverse_dynamics``: whether torque predicted from measured motion can include the effect.
+    - ``beside``: causes of the same axis without which predicted torque does not show the effect reliably.
+    - ``unrepeatable``: no two runs repeat the effect; it is noise.
+    - ``absorbed_by``: identified quantities that absorb the effect.
+    - ``shown_by``: experiments that tell it from other effects, the best first.
     """
 
     name: str
@@ -134,27 +147,27 @@ class EffectInfo:
 
     @property
     def late(self) -> bool:
-        """Whether it is that something comes late: torque, a reading, references."""
+        """Whether the effect makes something late: torque, a reading, references."""
         return self.family == "timing"
 
     @property
     def drive_lag(self) -> bool:
-        """Whether it is a delay or lag of the drive, between commanded and applied torque."""
+        """Whether the effect is a delay or lag of the drive, between commanded and applied torque."""
         return self.late and self.acts == "torque_path"
 
     @property
     def carried(self) -> bool:
-        """Whether it is mass, inertia or weight: every axis that carries it feels it."""
+        """Whether the effect is mass, inertia or weight: every axis that carries it feels it."""
         return self.family == "load"
 
     @property
     def of_gear(self) -> bool:
-        """Whether it is a law of the gear: a second one may mend the formula of the first."""
+        """Whether the effect is a law of the gear: a second gear law may correct the formula of the first."""
         return self.law_of == "gear"
 
     @property
     def torque_unit(self) -> bool:
-        """Whether it is another unit of torque: the command counts for more or less than stated."""
+        """Whether the effect changes the unit of torque: a command makes more or less than stated."""
         return "torque" in self.absorbed_by
 
     def marked(self, mark: Mark) -> tuple[str, ...]:
@@ -162,7 +175,7 @@ class EffectInfo:
         return tuple(p.name for p in self.parameters if mark in p.marks)
 
     def terms(self) -> dict[str, tuple[str, str, str]]:
-        """Return order, cosine and sine parameter of numbered harmonic terms, by their number."""
+        """Return order, cosine and sine parameter of each harmonic term, by its number as text."""
         names = [p.name for p in self.parameters]
         numbers = [n.removeprefix("order_") for n in names if re.fullmatch(r"order_\d+", n)]
         waves = {k: [n for n in names if n.split("_")[1:2] == [k]] for k in numbers}
@@ -179,8 +192,8 @@ def effect_table() -> Mapping[str, EffectInfo]:
 
 
 def _info(row: _core.EffectInfo) -> EffectInfo:
-    """Return what a row of the core says."""
-    # The core's words are those of the classes: a test compares them.
+    """Return the description in a row of the core's table."""
+    # Field names of the core are those of the classes; a test compares them.
     rest: dict[str, Any] = dict(row)
     rest |= {k: tuple(rest[k]) for k in _TUPLES}
     rest["formula"] = Formula(**row["formula"])

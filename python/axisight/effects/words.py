@@ -1,4 +1,4 @@
-"""Effects in sentences: proper names, articles, capitals; derived from the name, for any effect."""
+"""Effects in sentences: noun, article and capitals, derived from the name of any effect."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from axisight.effects.table import effect_info
 
 _WORDS = {"coulomb": "Coulomb", "stribeck": "Stribeck", "com": "centre of mass"}
 
-# Last words of names that take no article: one says "friction", but "a delay".
+# Last words of names that take no article: "friction", but "a delay".
 _UNCOUNTED = re.compile(
     r"\b(friction|backlash|play|stiffness|damping|inertia|ripple|drag|saturation|compensation"
     r"|hysteresis|compliance|coupling|quantization|eccentricity|motion|geometry|tilt|drift"
@@ -17,7 +17,7 @@ _UNCOUNTED = re.compile(
 
 
 def noun(name: str) -> str:
-    """Return a name as words: ``coulomb_friction`` as ``Coulomb friction``, ``input_delay`` as it reads."""
+    """Return a name as words: ``coulomb_friction`` becomes ``Coulomb friction``."""
     words = [_WORDS.get(word, word) for word in name.split("_")]
     return " ".join(words).replace(" dependent", "-dependent").strip()
 
@@ -29,10 +29,10 @@ def title(name: str) -> str:
 
 
 def article(name: str) -> str:
-    """Return what stands before the noun of an effect: ``a``, ``an``, ``the machine's`` or nothing.
+    """Return the article before an effect's noun: ``a``, ``an``, ``the machine's`` or nothing.
 
-    An effect that changes what every simulator has (stiffness or a torque constant by a share, a
-    link of the arm) is the machine's own value of it. Raises InputError for an unknown effect.
+    ``the machine's`` stands for effects that change a value of every simulator: a link of the arm, or a
+    relative change such as stiffness or torque constant. Raises InputError for an unknown effect.
     """
     info = effect_info(name)
     of_a_link = info.scope == "axis" and info.family == "load"
@@ -45,7 +45,7 @@ def article(name: str) -> str:
 
 
 def phrase(name: str) -> str:
-    """Return an effect as what a simulator lacks: ``a payload``, ``backlash``, ``an input delay``.
+    """Return an effect as the missing thing: ``a payload``, ``backlash``, ``an input delay``.
 
     Raises InputError for an unknown effect.
     """

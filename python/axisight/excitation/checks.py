@@ -1,4 +1,4 @@
-"""Checks shared by the makers of signals."""
+"""Checks of arguments that all signals share."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import numpy as np
 from axisight.arguments import Real, positive, reals, shown
 from axisight.errors import InputError
 
-# Samples of a signal, all periods together: 1 GB. The core's own bound is higher.
+# Most samples of a signal over all periods: 1 GB. The core's own bound is higher.
 MOST_SAMPLES = 2**27
 
-# Squares, and sums of them, are still numbers.
+# Squares of such sizes, and their sums, stay finite and above zero.
 SMALLEST_SIZE, LARGEST_SIZE = 1e-100, 1e100
 
 
 def whole_samples(field: str, seconds: object, sample_time_s: object) -> int:
-    """Return ``seconds`` in samples; decimal fractions may be a rounding error off."""
+    """Return ``seconds`` as a number of samples, which must be whole up to rounding."""
     step = positive("sample_time_s", sample_time_s)
     ratio = positive(field, seconds) / step
     count = round(ratio) if ratio < MOST_SAMPLES else 0
@@ -28,7 +28,7 @@ def whole_samples(field: str, seconds: object, sample_time_s: object) -> int:
 
 
 def few_enough(field: str, n_samples: int) -> int:
-    """Return a number of samples that a signal may have."""
+    """Return ``n_samples``; raises InputError above MOST_SAMPLES."""
     if n_samples > MOST_SAMPLES:
         raise InputError(f"{field}: expected at most {MOST_SAMPLES} samples, got {n_samples}")
     return n_samples
@@ -51,7 +51,7 @@ def per_item(field: str, value: object, count: int) -> Real:
 
 
 def size_of(field: str, value: object) -> float:
-    """Return an amplitude: positive, and neither it nor its square near the ends of numbers."""
+    """Return a positive amplitude from SMALLEST_SIZE to LARGEST_SIZE; raises InputError for others."""
     size = positive(field, value)
     if not SMALLEST_SIZE <= size <= LARGEST_SIZE:
         raise InputError(

@@ -1,4 +1,4 @@
-"""Phases that make the crest factor small."""
+"""Search for phases with a small crest factor."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from axisight.excitation.multisine import Multisine, response_at
 class Clipping:
     """Settings of the clipping algorithm, Wernholt (2004), Algorithm 5.1.
 
-    The level falls off as 1 - level goes geometrically from ``1 - first_level`` to
-    ``1 - last_level``, relative to the peak. What is clipped is subtracted ``relaxation``
-    times: 1 is the algorithm as published, over-relaxation needs fewer iterations.
-    ``oversampling`` of the grid is relative to the Nyquist count of the highest line and
-    rounded up to a power of two in samples; peaks hide between samples below 8.
+    The clipping level rises from ``first_level`` to ``last_level``, relative to the peak, so that
+    1 - level falls geometrically. The clipped part is subtracted ``relaxation`` times: 1 is the
+    algorithm as published, and over-relaxation needs fewer iterations. ``oversampling`` of the grid
+    is relative to the Nyquist count of the highest line, rounded up to a power of two in samples.
+    Below 8 the grid misses peaks between samples.
     """
 
     iterations: int = 300
@@ -48,8 +48,8 @@ class Clipping:
 class LpRefinement:
     """Settings of the refinement in the L2p norm (Guillaume et al. 1991).
 
-    The exponent 2p doubles from ``first_exponent`` to ``last_exponent``; at each at most
-    ``iterations`` damped Gauss-Newton steps are tried.
+    The exponent 2p doubles from ``first_exponent`` to ``last_exponent``, with at most ``iterations``
+    damped Gauss-Newton steps at each. ``oversampling`` is that of :class:`Clipping`.
     """
 
     first_exponent: int = 8
@@ -61,21 +61,20 @@ class LpRefinement:
 @summarized
 @dataclass(frozen=True, eq=False)
 class CrestSearch:
-    """What a search found.
+    """Result of a search for a small crest factor.
 
     signal
-        The multisine with the phases (and the snow) found.
+        The multisine with the best phases (and snow).
     crest_factor
-        The crest factor made small: of the signal, or of its output if a response was given.
+        The minimized crest factor: of the signal, or of its output if a response was given.
     start, seed
-        The start that won: its random phases were those of (seed, run=start); -1 for given
-        phases.
+        The best start, which began at the random phases of (seed, run=start); -1 for given phases.
     crest_factors
-        Of every start begun, in order.
+        Crest factors of all starts begun, in order.
     clipping_iterations, refinement_steps
-        Effort of all starts together.
+        Totals over all starts.
     status
-        ``"completed"``, or ``"out_of_time"``: the time ended before the starts did.
+        ``"completed"``, or ``"out_of_time"`` if the time ended before the starts did.
     """
 
     signal: Multisine
@@ -102,25 +101,24 @@ def optimize_crest_factor(
     response: ArrayLike | None = None,
     threads: int = 0,
 ) -> CrestSearch:
-    """Return the signal with new phases and a small crest factor; amplitudes stay.
+    """Return the signal with new phases, the same amplitudes and a small crest factor.
 
     Parameters
     ----------
     signal : the multisine; its snow, if any, is replaced.
-    starts : number of starts. Without ``time_s`` the result depends on signal, settings,
-        seed and this only.
-    time_s : wall time [s] after which no start is begun and the running ones end.
+    starts : number of starts. Without ``time_s`` the result depends only on signal, settings,
+        seed and ``starts``.
+    time_s : wall time [s] after which no start begins and the running ones end.
     seed : start i begins at the phases of :func:`random_phases` for (seed, i).
     from_signal : start once from the phases of the signal instead.
     clipping : settings of the clipping algorithm, run first.
-    refinement : settings of the refinement after it; ``"none"`` leaves it out.
-    snow_lines : further lines that may be added ("snowing"), with amplitudes up to
-        ``snow_limit`` times the root mean square of the signal's.
-    snow_limit : see there.
-    response : complex (n_lines,), response at the lines: the crest factor of the output
-        ``G u`` is made small instead of that of the signal. Not together with snow, at whose
-        lines the response is not known.
-    threads : 0 takes every core. The result does not depend on it.
+    refinement : settings of the refinement after clipping; ``"none"`` leaves it out.
+    snow_lines : further lines that the search may add ("snowing").
+    snow_limit : largest amplitude of snow lines, relative to the rms of the signal's amplitudes.
+    response : complex (n_lines,), response G at the lines. The search then minimizes the crest factor
+        of the output ``G u`` instead. Not together with snow, because the response at its lines is
+        not known.
+    threads : number of threads, 0 for all cores. The result does not depend on it.
 
     Raises InputError naming the field.
 
@@ -156,7 +154,7 @@ def optimize_crest_factor(
         time_s=None if time_s is None else positive("time_s", time_s),
         threads=threads_of(threads),
     )
-    if found is None:  # only a cancel token does that, and none was given
+    if found is None:  # a cancelled search; without a cancel token only Ctrl-C cancels
         raise KeyboardInterrupt
     count = len(signal.lines)
     size = float(np.sqrt(np.mean(signal.amplitude**2)))
@@ -181,7 +179,7 @@ def optimize_crest_factor(
 
 
 def _numbers(field: str, settings: Clipping | LpRefinement) -> tuple[Any, ...]:
-    """Return the settings as the search takes them; it checks their ranges."""
+    """Return the settings in the form of the core, which checks their ranges."""
     instance(field, settings, LpRefinement if field == "refinement" else Clipping)
     out: list[float] = []
     for setting in fields(settings):

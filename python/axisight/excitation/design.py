@@ -1,4 +1,4 @@
-"""An excitation as a design in TOML: what ``axisight excite`` carries out."""
+"""The design of an excitation in TOML, which ``axisight excite`` carries out."""
 
 from __future__ import annotations
 
@@ -41,12 +41,15 @@ class _Part(BaseModel):
 
 
 class SignalDesign(_Part):
-    """The broadband signal; ``peak_rad_s`` is its largest value, motor side.
+    """The broadband signal; ``peak_rad_s`` is its largest absolute value, motor side.
 
-    ``kind`` decides what else counts. Multisine: ``period_s``, ``band_hz`` with ``grid`` (or
-    ``lines``), ``phases`` (``"optimized"`` takes the best of ``starts`` or what ``time_s``
-    allows), ``seed``, ``run``. Chirp, stepped sine and discrete-interval binary: ``period_s``
-    and ``band_hz``; triangle: ``period_s``; PRBS: ``bits`` and ``hold``.
+    ``kind`` decides which other fields apply:
+
+    - multisine: ``period_s``, ``band_hz`` with ``grid`` (or ``lines``), ``phases``, ``seed``, ``run``.
+      ``"optimized"`` phases are the best of ``starts``, or of the starts within ``time_s``.
+    - chirp, stepped sine, discrete-interval binary: ``period_s`` and ``band_hz``
+    - triangle: ``period_s``
+    - PRBS: ``bits`` and ``hold``
     """
 
     kind: Literal[
@@ -77,7 +80,7 @@ class SquareDesign(_Part):
 
 
 class LimitDesign(_Part):
-    """Limits of the motors, one number or one per axis, and how long to simulate."""
+    """Limits of the motors, one number or one per axis, and the number of periods to simulate."""
 
     velocity_rad_s: PerAxis | None = None
     acceleration_rad_s2: PerAxis | None = None
@@ -87,10 +90,10 @@ class LimitDesign(_Part):
 
 
 class ExcitationDesign(_Part):
-    """References for a robot (file or preset).
+    """The design of references for a robot (file or preset).
 
-    ``directions`` is ``"t1"``, ``"t2"``, ``"hadamard"``, ``"dft"`` or rows over axes and
-    columns over experiments. Without ``limits`` nothing is simulated.
+    ``directions`` is ``"t1"``, ``"t2"``, ``"hadamard"``, ``"dft"`` or a matrix with one row per axis
+    and one column per experiment. Without ``limits`` there is no simulation.
     """
 
     schema_: Annotated[Literal["axisight.excite/1"], Field(alias="schema")] = "axisight.excite/1"
@@ -105,7 +108,7 @@ class ExcitationDesign(_Part):
 @summarized
 @dataclass(frozen=True, eq=False)
 class Excited:
-    """What a design gave: references, search of phases and check of limits if there were any."""
+    """The result of a design: references, signal, and the phase search and limit check if it has them."""
 
     references: References
     signal: Multisine | PeriodicSignal
@@ -116,7 +119,7 @@ class Excited:
 def read_design(data: dict[str, Any], where: str = "design") -> ExcitationDesign:
     """Return the checked design in ``data``, the content of a TOML file.
 
-    Raises InputError naming every field that is wrong, after ``where`` it stands.
+    Raises InputError naming every wrong field; the message begins with ``where``.
     """
     instance("data", data, dict)
     unnamed = [key for key in data if not isinstance(key, str)]
@@ -133,7 +136,11 @@ def read_design(data: dict[str, Any], where: str = "design") -> ExcitationDesign
 
 
 def load_design(path: Path | str) -> dict[str, Any]:
-    """Return the design in a TOML file, not yet checked; a robot file lies next to it."""
+    """Return the unchecked design in a TOML file.
+
+    A robot file is found relative to the design file. Raises InputError for a file that cannot be
+    read or is not TOML.
+    """
     source = path_of("path", path)
     try:
         data = parse_toml(read_text(source))
@@ -146,9 +153,9 @@ def load_design(path: Path | str) -> dict[str, Any]:
 
 
 def excite(design: ExcitationDesign, robot: Robot | None = None) -> Excited:
-    """Carry a design out; raises InputError naming the field.
+    """Carry out a design and return its references; raises InputError naming the field.
 
-    ``robot`` stands for the one that the design names, with effects of its own for example.
+    ``robot`` replaces the one that the design names, for example by one with effects.
     """
     instance("design", design, ExcitationDesign)
     robot = load_robot(design.robot) if robot is None else instance("robot", robot, Robot)

@@ -1,4 +1,4 @@
-"""Which input moves how in which experiment."""
+"""Matrices that give the amplitude of every input in every experiment."""
 
 from __future__ import annotations
 
@@ -19,9 +19,13 @@ MOST_INPUTS = 4096
 def direction_matrix(name: Directions | ArrayLike, n_inputs: int) -> Real:
     """Return T of ``r(t) = T r_0(t)``, (n_inputs, n_experiments), Wernholt (2004), (6.5).
 
-    ``"t1"`` or ``"identity"`` is one input at a time; ``"t2"`` that of (6.6), three inputs only;
-    ``"hadamard"`` has orthogonal rows of plus and minus one, for 1, 2, 4, 8, ... inputs. A
-    matrix of full row rank passes as it is. Raises InputError.
+    ``name`` is a matrix of full row rank, which is returned, or:
+
+    - ``"t1"`` or ``"identity"``: one input at a time
+    - ``"t2"``: the matrix of (6.6), for three inputs
+    - ``"hadamard"``: orthogonal rows of plus and minus one, for 1, 2, 4, 8, ... inputs
+
+    Raises InputError for other names, shapes and ranks.
     """
     n = whole("n_inputs", n_inputs, 1, MOST_INPUTS)
     if isinstance(name, str):
@@ -45,9 +49,8 @@ def direction_matrix(name: Directions | ArrayLike, n_inputs: int) -> Real:
 def dft_matrix(n_inputs: int) -> NDArray[np.complex128]:
     """Return the DFT matrix ``W[i, e] = exp(2 pi i i e / n)``, (n_inputs, n_experiments).
 
-    With random phases of its own for every input, ``U(k) = diag(exp(i phi(k))) W`` has
-    orthogonal rows at every line, for any number of inputs (Dobrowiecki, Schoukens and
-    Guillaume 2006).
+    If every input has its own random phases, ``U(k) = diag(exp(i phi(k))) W`` has orthogonal rows at
+    every line, for any number of inputs (Dobrowiecki, Schoukens and Guillaume 2006).
     """
     index = np.arange(whole("n_inputs", n_inputs, 1, MOST_INPUTS))
     return np.asarray(np.exp(2j * np.pi * np.outer(index, index) / len(index)))

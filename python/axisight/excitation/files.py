@@ -1,4 +1,4 @@
-"""References in files, the design beside the samples."""
+"""Files of references, with samples and design."""
 
 from __future__ import annotations
 
@@ -29,14 +29,17 @@ _KINDS = (".csv", ".mat", ".parquet")
 
 
 def write_references(reference: References, path: Path | str) -> list[Path]:
-    """Write one period of every experiment with its design; return the files written.
+    """Write one period of every experiment with its design, and return the files written.
 
-    ``.csv`` and ``.parquet`` have columns ``experiment`` (from 1), ``time_s`` and
-    ``velocity_ref_1``, ... (``input_1``, ... for a unit other than rad/s); ``.mat`` has
-    ``period`` (n_experiments, n_samples, n_inputs) and ``sample_time_s``. The design is JSON:
-    beside a CSV in ``NAME.design.json``, in the variable ``design`` of a MAT file, in the
-    metadata of a Parquet file. Numbers are written in full. Raises InputError for another
-    ending, OutputError for what cannot be written.
+    The ending of ``path`` sets the format:
+
+    - ``.csv`` and ``.parquet`` have columns ``experiment`` (from 1), ``time_s`` and
+      ``velocity_ref_1``, ... (``input_1``, ... for a unit other than rad/s)
+    - ``.mat`` has ``period`` (n_experiments, n_samples, n_inputs) and ``sample_time_s``
+
+    The design is JSON, in ``NAME.design.json`` next to a CSV file, in the variable ``design`` of a MAT
+    file, or in the metadata of a Parquet file. Numbers keep full precision. Raises InputError for
+    another ending, and OutputError for a file that cannot be written.
     """
     instance("reference", reference, References)
     target = _known(path)
@@ -71,13 +74,13 @@ def _bytes(reference: References, text: str, kind: str) -> bytes:
         arrow = arrow.replace_schema_metadata({**(arrow.schema.metadata or {}), _KEY: text})
         pq.write_table(arrow, buffer)
     else:
-        # The shortest text that reads back as the same number.
+        # pandas writes the shortest text that reads back as the same number.
         buffer.write(_table(reference).to_csv(index=False).encode())
     return buffer.getvalue()
 
 
 def holds_references(path: Path | str) -> bool:
-    """Return whether :func:`write_references` wrote a file: its design is with it."""
+    """Return whether :func:`write_references` wrote a file, recognized by its design."""
     source = path_of("path", path)
     if source.suffix == ".csv":
         return _beside(source).exists()
@@ -90,7 +93,10 @@ def holds_references(path: Path | str) -> bool:
 
 
 def read_references(path: Path | str) -> References:
-    """Return what :func:`write_references` wrote; raises InputError naming file and field."""
+    """Return the references that :func:`write_references` wrote to ``path``.
+
+    Raises InputError naming file and field.
+    """
     source = _known(path)
     try:
         text, period = _content(source)
@@ -110,7 +116,7 @@ def read_references(path: Path | str) -> References:
         raise InputError(f"{source}: expected references with their design: {error}") from None
     except InputError:
         raise
-    except Exception as e:  # damage makes readers raise nearly anything
+    except Exception as e:  # readers raise exceptions of many types for damaged files
         raise InputError(
             f"{source}: expected references with their design: {short(repr(e), 200)}"
         ) from None

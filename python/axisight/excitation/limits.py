@@ -1,4 +1,4 @@
-"""Would the machine stand it? Velocity, acceleration and torque of a simulated run."""
+"""Check of motor velocity, acceleration and torque against limits, in a simulated run."""
 
 from __future__ import annotations
 
@@ -33,9 +33,10 @@ UNITS: dict[Quantity, str] = {
 @summarized
 @dataclass(frozen=True)
 class Limits:
-    """Largest absolute values of every motor: one number for all axes, one per axis, or None.
+    """Limits of the motors: one number for all axes, one per axis, or None for no limit.
 
-    ``velocity_rad_s`` holds for the reference and for the motor; all are motor side.
+    All limits are absolute values on the motor side: velocity [rad/s], acceleration [rad/s^2] and
+    torque [Nm]. ``velocity_rad_s`` applies to the reference and to the motor.
     """
 
     velocity_rad_s: ArrayLike | None = None
@@ -46,11 +47,11 @@ class Limits:
 @summarized
 @dataclass(frozen=True)
 class Excess:
-    """One limit that one axis passes in one experiment.
+    """One limit that one axis exceeds in one experiment.
 
-    ``experiment`` and ``axis`` count from 1. ``largest`` at ``at_s`` is the largest absolute
-    value; ``first_s`` is when the limit is passed first; ``n_samples`` how often, all periods
-    and the start together.
+    ``experiment`` and ``axis`` count from 1. ``largest``, at ``at_s`` [s], is the largest absolute
+    value. ``first_s`` [s] is when the axis first exceeds the limit, and ``n_samples`` the number of
+    samples above it, over the start and all periods. Values are in the unit of the quantity.
     """
 
     quantity: Quantity
@@ -63,7 +64,7 @@ class Excess:
     n_samples: int
 
     def __str__(self) -> str:
-        """One line for people."""
+        """Return the excess as one line of text."""
         unit = UNITS[self.quantity]
         return (
             f"experiment {self.experiment}, axis {self.axis}: {self.quantity} "
@@ -75,12 +76,12 @@ class Excess:
 @summarized
 @dataclass(frozen=True, eq=False)
 class LimitReport:
-    """What a check found.
+    """Result of a check of limits.
 
-    ``excesses`` worst first, relative to the limit; ``largest`` the largest absolute values
-    (quantity, experiment, axis); ``failed`` the experiments (from 1) whose simulation did not
-    complete, with its status; ``compared`` the quantities that had a limit; ``method`` is
-    "closed_loop" or, for robots without a known controller, "inverse_dynamics".
+    ``excesses`` are ordered by size relative to the limit, worst first. ``largest`` are the largest
+    absolute values (quantity, experiment, axis). ``failed`` maps experiments (from 1) whose
+    simulation did not complete to its status. ``compared`` are the quantities that had a limit.
+    ``method`` is "closed_loop" or, for robots without a known controller, "inverse_dynamics".
     """
 
     excesses: tuple[Excess, ...]
@@ -91,11 +92,11 @@ class LimitReport:
 
     @property
     def ok(self) -> bool:
-        """Whether every experiment ran to its end and no limit that was given is passed."""
+        """Whether every experiment ran to its end within all given limits."""
         return not self.excesses and not self.failed
 
     def __str__(self) -> str:
-        """What is wrong, a line each; or that nothing is, and what was compared."""
+        """Return one line per excess or failure; without any, a line with what was compared."""
         lines = [f"experiment {e}: simulation {status}" for e, status in self.failed.items()]
         lines += [str(excess) for excess in self.excesses]
         if not self.compared:
@@ -124,22 +125,22 @@ def check_limits(
     effects: Iterable[Effect] = (),
     start_rad: Sequence[float] | None = None,
 ) -> LimitReport:
-    """Simulate every experiment in closed loop from rest and compare with the limits.
+    """Simulate every experiment in closed loop from rest, and return where it exceeds the limits.
 
     Parameters
     ----------
     reference : motor-side velocity references [rad/s] at the robot's sample time.
-    robot : the model. Without a known controller (kind ``"none"``) there is no loop to
-        simulate: the motors are taken to follow the reference, repeated for ever, and the
-        torque is that of the rigid robot, :func:`axisight.Robot.inverse_dynamics` with motor
-        inertia and viscous friction. ``model`` then has no meaning, effects are refused.
-    limits : what must not be passed.
-    periods : periods to simulate; the first one holds the start from rest.
+    robot : the model. Without a known controller (kind ``"none"``) there is no loop to simulate.
+        The check then assumes that the motors follow the periodic reference exactly, and computes
+        the torque of the rigid robot by :func:`axisight.Robot.inverse_dynamics` with motor inertia
+        and viscous friction. It ignores ``model`` and refuses effects.
+    limits : the limits to check.
+    periods : number of periods to simulate; the first includes the start from rest.
     model, effects, start_rad : as in :func:`axisight.simulate`.
 
     Velocity and acceleration are means over a sample, from true motor positions; torque is the
     command. Raises InputError for other sample times, axes or units, for limits that are
-    not positive, and for effects where there is no controller.
+    not positive, and for effects without a known controller.
 
     """
     instance("reference", reference, References)
@@ -212,7 +213,7 @@ def _simulated(run: xr.Dataset, given: Real, rest: Real, step: float) -> dict[Qu
 
 
 def _followed(given: Real, robot: Robot, start_rad: Sequence[float] | None) -> dict[Quantity, Real]:
-    """Signals of motors that follow the reference, which comes round after its last sample."""
+    """Return the signals of motors that follow the periodic reference."""
     acceleration = (given - np.roll(given, 1, axis=1)) / robot.sample_time_s
     return {
         "reference_velocity": given,
@@ -239,7 +240,7 @@ def _bounds(limits: Limits, n_axes: int) -> dict[Quantity, Real]:
 
 
 def _excesses(quantity: Quantity, signal: Real, bound: Real, step: float) -> list[Excess]:
-    # A run that failed is NaN afterwards, which is above nothing; it is listed as failed.
+    # A failed run ends in NaN, which exceeds no limit; the report lists the run as failed.
     size = np.abs(signal)
     above = size > bound
     out = []

@@ -1,4 +1,4 @@
-"""Which lines of a band are excited, and which are left free to detect distortion."""
+"""Excited lines of a band, and lines left free to detect distortion."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def line_set(
 
 
 def _thinned(odd: Lines, group: int, seed: int, run: int) -> Lines:
-    """Leave one line out of every full group."""
+    """Return the lines without one random line of every full group."""
     rng = np.random.default_rng([seed_of("seed", seed), seed_of("run", run)])
     count = len(odd) // group
     left_out = np.arange(count) * group + rng.integers(0, group, count)

@@ -53,9 +53,9 @@ class Multisine:
         Excited lines k, ascending, 1 <= k < N / 2; amplitudes A > 0 in the unit of the
         signal; phases [rad]; all (n_lines,).
     detection_lines
-        Lines left free on purpose.
+        Lines that are left free to detect distortion.
     snow_lines, snow_amplitude, snow_phase_rad
-        Further lines that only lower the crest factor; their power counts for nothing.
+        Further lines that only lower the crest factor; the effective rms leaves out their power.
 
     Raises InputError naming the field.
     """
@@ -71,7 +71,7 @@ class Multisine:
     snow_phase_rad: Real = field(default_factory=_nothing)
 
     def __post_init__(self) -> None:
-        """Check everything and hold arrays of the right type."""
+        """Check all fields and convert them to arrays."""
         object.__setattr__(self, "sample_time_s", positive("sample_time_s", self.sample_time_s))
         n = whole("n_samples", self.n_samples, 3, MOST_SAMPLES)
         object.__setattr__(self, "n_samples", n)
@@ -126,10 +126,10 @@ class Multisine:
 
     @cached_property
     def peak(self) -> float:
-        """Largest absolute value between the samples too.
+        """Largest absolute value, also between the samples.
 
-        Taken on a grid of at least 64 samples per cycle of the highest line, 32 times its
-        Nyquist count, with a parabola through the highest three; exact to 1e-5.
+        Evaluated on a grid of at least 64 samples per cycle of the highest line, 32 times its
+        Nyquist count, with a parabola through the highest three; the relative error is below 1e-5.
         """
         snow = self.snow_amplitude > 0
         return _core.multisine_peak(
@@ -144,7 +144,10 @@ class Multisine:
         return self.peak / self.rms
 
     def scaled(self, *, peak: float | None = None, rms: float | None = None) -> Multisine:
-        """Return the signal with this peak or this effective rms; give exactly one."""
+        """Return the signal with this peak or effective rms.
+
+        Raises InputError unless exactly one of them is given.
+        """
         if (peak is None) == (rms is None):
             raise InputError("peak, rms: expected exactly one of them")
         name, target, own = ("rms", rms, self.rms) if peak is None else ("peak", peak, self.peak)
@@ -156,9 +159,9 @@ class Multisine:
         )
 
     def through(self, response: ArrayLike) -> Multisine:
-        """Return the steady-state output of ``response``, complex (n_lines,).
+        """Return the steady-state output of a system with this ``response``, complex (n_lines,).
 
-        Snow and detection lines are left out. Raises InputError for a response that is zero
+        The output has no snow or detection lines. Raises InputError for a response that is zero
         or not finite at a line.
         """
         gain = response_at(response, len(self.lines))
@@ -199,16 +202,15 @@ def multisine(
 
     Parameters
     ----------
-    period_s : period T0 [s], a whole number of samples of
-    sample_time_s : [s].
-    band_hz, grid, group : lines of the band as in :func:`line_set`; or
-    lines : the lines themselves. Give exactly one of ``band_hz`` and ``lines``.
-    amplitude : one number, one per line, or a function of the frequencies [Hz]. A line of
-        amplitude zero is refused: leave it out.
+    period_s : period T0 [s], a whole number of samples.
+    sample_time_s : sample time [s].
+    band_hz, grid, group : lines of a band as in :func:`line_set`.
+    lines : the lines themselves, multiples of 1/T0. Give exactly one of ``band_hz`` and ``lines``.
+    amplitude : one number, one per line, or a function of the frequencies [Hz]. Leave out lines of
+        amplitude zero; they are refused.
     phases : ``"schroeder"`` (:func:`schroeder_phases`), ``"random"`` (uniform, a function of
-        (seed, run); those of the Monte Carlo study's run of that number), or one number
-        [rad] per line.
-    seed, run : rule random phases and the detection lines of ``"odd_random"``.
+        (seed, run), as in run number ``run`` of a Monte Carlo study), or one number [rad] per line.
+    seed, run : determine random phases and the detection lines of ``"odd_random"``.
 
     Raises InputError naming the field.
 
@@ -257,7 +259,8 @@ def schroeder_phases(amplitude: ArrayLike) -> Real:
     """Return Schroeder's phases [rad] for amplitudes (n_lines,).
 
     ``phi_k = -2 pi sum_{j<k} (k - j) p_j`` with p the shares of the power (Schroeder 1970);
-    for a flat spectrum ``-k (k - 1) pi / F``, Wernholt (2004), section 5.4.
+    for a flat spectrum ``-k (k - 1) pi / F``, Wernholt (2004), section 5.4. Raises InputError for
+    amplitudes that are all zero.
     """
     size = reals("amplitude", amplitude, "numbers of shape (n_lines,)", 1)
     if not np.any(size != 0):

@@ -13,16 +13,16 @@ from axisight.excitation.references import References
 from axisight.excitation.signals import PeriodicSignal
 from axisight.palette import AFTER, BEFORE, MEASURED, SERIES
 
-_MANY = 60  # lines from which on dots stand without stems
+_MANY = 60  # with more lines, stems would cover the panel
 _DENSE = 4000  # samples drawn across a panel
 
 
 def plot_signal(signal: Multisine | PeriodicSignal, *, unit: str = "rad/s") -> Figure:
     """Plot one period, the amplitudes of its lines and the histogram of its samples.
 
-    Excited lines, snow and lines left free for detection are told apart; the histogram has the
-    peak and the effective rms, whose ratio is the crest factor. ``unit`` is that of the signal.
-    Returns a Figure; raises InputError for anything but a signal.
+    Excited, snow and detection lines have different colours. The histogram shows the peak and the
+    effective rms, whose ratio is the crest factor. ``unit`` is that of the signal. Returns a Figure;
+    raises InputError for anything but a signal.
     """
     instance("signal", signal, Multisine, PeriodicSignal)
     figure = Figure(figsize=(7.2, 4.4), layout="constrained")
@@ -38,7 +38,7 @@ def plot_signal(signal: Multisine | PeriodicSignal, *, unit: str = "rad/s") -> F
 
 
 def plot_references(references: References) -> Figure:
-    """Plot one period: inputs are rows, experiments columns, axes shared; returns a Figure."""
+    """Plot one period, inputs over rows and experiments over columns, and return a Figure."""
     instance("references", references, References)
     rows, columns = references.n_inputs, references.n_experiments
     size = (min(2.4 * columns, 16) + 0.6, min(1.3 * rows, 16) + 0.6)

@@ -1,4 +1,4 @@
-"""The references of all experiments: one period of each, and what they were made from."""
+"""The references of all experiments: one period of each, and their design."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class References:
     unit
         Unit of the samples.
     design
-        What they were made from, in plain numbers and words, so that files can hold it.
+        Signals, directions and settings as plain numbers and text, so that files can hold them.
     """
 
     sample_time_s: float
@@ -88,7 +88,7 @@ class References:
         return np.asarray(np.abs(self.period).max(axis=1))
 
     def repeated(self, periods: int) -> Real:
-        """Return whole periods in a row, (n_experiments, periods * n_samples, n_inputs)."""
+        """Return consecutive periods, (n_experiments, periods * n_samples, n_inputs)."""
         count = whole("periods", periods)
         few_enough("periods", count * self.period.size)
         return np.tile(self.period, (1, count, 1))
@@ -105,23 +105,23 @@ def references(
     run: int = 0,
     unit: str = "rad/s",
 ) -> References:
-    """Return ``r(t) = T r_bb(t) + r_sq(t) + dc``, Wernholt (2004), section 7.1.
+    """Return the references ``r(t) = T r_bb(t) + r_sq(t) + dc``, Wernholt (2004), section 7.1.
 
     Parameters
     ----------
     broadband : the scalar signal r_bb.
     n_inputs : number of inputs (axes).
-    directions : T, see :func:`direction_matrix`; or ``"dft"``, for multisines without snow:
-        input i has phases of its own (the first those of the signal, the others those of
-        (seed, run * n_inputs + i)), turned by 2 pi i e / n in experiment e, see
+    directions : T, see :func:`direction_matrix`; or ``"dft"``, for multisines without snow.
+        With ``"dft"`` every input has its own phases: the first those of the signal, input i
+        those of (seed, run * n_inputs + i). Experiment e turns them by 2 pi i e / n, see
         :func:`dft_matrix`. No input exceeds the peak of ``broadband``. Only the first input
-        keeps optimized phases: the others have the crest factor of random ones, about 3.5
-        instead of 1.4, and so, at the same peak, 40 % of the amplitude.
+        keeps optimized phases. The others have the crest factor of random phases, about 3.5
+        instead of 1.4, and so 40 % of the amplitude at the same peak.
     square : added to all inputs; its period divides that of the signal.
-    dc_level : added to the inputs, one number or (n_inputs,). A velocity of
-        ``(pi / 2) / T0`` moves the motor by a quarter turn from period to period, so that
-        repetitive disturbances differ between them (section 7.2.8).
-    seed, run : rule the phases of ``"dft"``.
+    dc_level : added to the inputs, one number or (n_inputs,), in ``unit``. A velocity of
+        ``(pi / 2) / T0`` moves the motor by a quarter turn per period, so that repetitive
+        disturbances differ from period to period (section 7.2.8).
+    seed, run : determine the phases of ``"dft"``.
     unit : unit of the samples.
 
     Raises InputError naming the field.
@@ -163,7 +163,7 @@ def references(
 
 
 def describe(signal: Multisine | PeriodicSignal) -> dict[str, Any]:
-    """Return a signal in plain numbers and words."""
+    """Return a signal as plain numbers and text."""
     figures = {"rms": signal.rms, "peak": signal.peak, "crest_factor": signal.crest_factor}
     common = {"sample_time_s": signal.sample_time_s, "n_samples": signal.n_samples, **figures}
     if isinstance(signal, PeriodicSignal):
@@ -194,7 +194,7 @@ def _orthogonal(signal: Multisine | PeriodicSignal, n: int, seed: int, run: int)
         if i:
             own = random_phases(len(signal.lines), seed, run * n + i)
         inputs = [replace(signal, phase_rad=own + turns[i, e]) for e in range(n)]
-        # One scale for all experiments of an input, or its rows would not be orthogonal.
+        # Different scales of one input's experiments would make rows not orthogonal.
         factor = signal.peak / max(x.peak for x in inputs)
         for e, x in enumerate(inputs):
             period[e, :, i] = factor * x.period

@@ -15,8 +15,9 @@ def rigid_torque(
 ) -> Real:
     """Return motor torques [Nm] of the robot without elasticity, (experiment, sample, axis).
 
-    ``velocity`` [rad/s] and ``acceleration`` [rad/s^2] of the motors have the same shape; the
-    motion starts at the equilibrium ``start_rad``, where elastic joints stay. Inverse dynamics:
+    ``velocity`` [rad/s] and ``acceleration`` [rad/s^2] of the motors have the same shape. The
+    motion starts at the equilibrium ``start_rad``; elastic joints keep their deflection there.
+    Inverse dynamics:
     ``tau = J_m phi'' + F_v phi' + r (M(q) q'' + c(q, q') + g(q))`` with ``q = r phi``.
     """
     rest = robot.equilibrium(start_rad)["joint_angle_rad"].values

@@ -35,7 +35,7 @@ from axisight.excitation.checks import (
     whole_samples,
 )
 
-# Samples per sample at which the peak of a continuous formula is looked for.
+# Oversampling of the grid on which the peak of a continuous formula is searched.
 _FINE = 32
 
 
@@ -45,16 +45,16 @@ class PeriodicSignal:
     """One period of a sampled signal.
 
     kind
-        What it is, e.g. ``"chirp"``.
+        Name of the signal, e.g. ``"chirp"``.
     sample_time_s, period
         Sample time [s] and one period, (n_samples,).
     lines
-        Lines on which it is meant to have power; empty where that is not the point.
+        Lines that are meant to carry power; empty for signals without such lines.
     peak
-        Largest absolute value: of the formula between the samples too for chirp and stepped
-        sine, of the samples for signals that are held.
+        Largest absolute value. For chirp and stepped sine it is that of the formula, also between the
+        samples; for held signals it is that of the samples.
     settings
-        What it was made from.
+        Arguments that the signal was made from.
     """
 
     kind: str
@@ -65,7 +65,7 @@ class PeriodicSignal:
     settings: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check all fields."""
         object.__setattr__(self, "sample_time_s", positive("sample_time_s", self.sample_time_s))
         period = reals("period", self.period, "numbers of shape (n_samples,)", 1).copy()
         if np.abs(period).max() > LARGEST_SIZE:
@@ -88,7 +88,7 @@ class PeriodicSignal:
 
     @property
     def rms(self) -> float:
-        """Effective root mean square: of the power on ``lines``, or of all without lines."""
+        """Effective root mean square: of the power on ``lines``, or of all power without lines."""
         if not self.lines.size:
             return float(np.sqrt(np.mean(self.period**2)))
         spectrum = np.fft.rfft(self.period)[self.lines] / self.n_samples
@@ -96,7 +96,7 @@ class PeriodicSignal:
 
     @property
     def crest_factor(self) -> float:
-        """Peak over effective rms; raises InputError where there is no power."""
+        """Peak over effective rms; raises InputError for a signal without power."""
         rms = self.rms
         if not rms > 0:
             raise InputError("period: expected power on the lines for a crest factor, got none")
@@ -116,7 +116,7 @@ def chirp(
     amplitude: float = 1.0,
     phase_rad: float = 0.0,
 ) -> PeriodicSignal:
-    """Return ``A sin(2 pi f1 t + pi (f2 - f1) t^2 / T0 + phi)``, Wernholt (2004), (5.4).
+    """Return a chirp ``A sin(2 pi f1 t + pi (f2 - f1) t^2 / T0 + phi)``, Wernholt (2004), (5.4).
 
     Parameters
     ----------
@@ -173,8 +173,8 @@ def chirp(
 def triangle(period_s: float, sample_time_s: float, *, amplitude: float = 1.0) -> PeriodicSignal:
     """Return a symmetric triangle wave of height ``amplitude`` that starts at zero, rising.
 
-    ``period_s`` must be a multiple of four samples of ``sample_time_s`` [s], so that the
-    tips are sampled.
+    ``period_s`` [s] must be a multiple of four samples of ``sample_time_s`` [s], so that samples hit
+    the tips. Raises InputError naming the field.
     """
     n = whole_samples("period_s", period_s, sample_time_s)
     if n % 4:
@@ -192,10 +192,10 @@ def square(
 ) -> PeriodicSignal:
     """Return a square wave smoothed by a triangular window, Wernholt (2004), (7.3).
 
-    It is plus and minus ``amplitude`` with period ``period_s`` [s], an even number of
-    samples of ``sample_time_s`` [s], and high in the first half; ``smoothing_samples`` is
-    l, the half length of the window. As a velocity reference it keeps motors away from
-    standstill. Raises InputError.
+    The wave is plus ``amplitude`` in the first half of ``period_s`` [s] and minus ``amplitude`` in
+    the second. The period is an even number of samples of ``sample_time_s`` [s];
+    ``smoothing_samples`` is l, the half length of the window. As a velocity reference, the wave
+    keeps motors away from standstill. Raises InputError naming the field.
     """
     ratio = positive("period_s", period_s) / positive("sample_time_s", sample_time_s)
     few_enough("period_s", math.ceil(min(ratio, 1e18)))
@@ -219,10 +219,10 @@ def prbs(
 ) -> PeriodicSignal:
     """Return a maximum-length binary sequence of ``2^bits - 1`` values plus or minus A.
 
-    A is ``amplitude``, ``bits`` is 2 to 24. Each value is held for ``hold`` samples of
-    ``sample_time_s`` [s]. The period follows: it has ``(2^bits - 1) hold`` samples. The mean is
-    ``A / (2^bits - 1)`` in size, the autocorrelation at any other shift ``-A^2 / (2^bits - 1)``.
-    Raises InputError naming the field.
+    A is ``amplitude``, and ``bits`` is 2 to 24. Each value is held for ``hold`` samples of
+    ``sample_time_s`` [s], so the period has ``(2^bits - 1) hold`` samples. The mean has the size
+    ``A / (2^bits - 1)``. The autocorrelation is ``-A^2 / (2^bits - 1)`` at every shift by whole
+    values other than zero. Raises InputError naming the field.
     """
     bits, hold = whole("bits", bits, 2, 24), whole("hold", hold)
     amplitude = size_of("amplitude", amplitude)
@@ -297,11 +297,11 @@ def discrete_interval_binary(
 
 
 def _settled(weight: Real, lines: Lines, count: int, phase: Real) -> Real:
-    """Signs that are those of the multisine with their own phases."""
+    """Return signs that equal those of the multisine with the phases of these signs."""
     spectrum = np.zeros(count // 2 + 1, np.complex128)
     turn = np.exp(1j * phase)
     signs = np.zeros(count)
-    # The weighted sum of amplitudes never falls, so the signs settle; 1000 is never seen.
+    # The weighted sum of amplitudes never falls, so the signs settle long before 1000 rounds.
     for _ in range(1000):
         spectrum[lines] = weight * turn
         now = np.where(np.fft.irfft(spectrum, count) >= 0, 1.0, -1.0)
@@ -317,15 +317,15 @@ def _settled(weight: Real, lines: Lines, count: int, phase: Real) -> Real:
 @summarized
 @dataclass(frozen=True)
 class SteppedSine:
-    """Single sines one after the other, each a whole number of periods T0.
+    """A sequence of single sines, each over a whole number of periods T0.
 
     signal
         The whole sequence as one long period.
     lines
         Line k of each step, a multiple of 1/T0.
     first_sample, n_samples
-        Where the part to be used of each step starts (its waiting periods are over), and how
-        many samples it has.
+        First sample of the part to use of each step, after its waiting periods, and the number of
+        samples of that part.
     """
 
     signal: PeriodicSignal
@@ -345,9 +345,9 @@ def stepped_sine(
 ) -> SteppedSine:
     """Return single sines at ``frequency_hz``, multiples of 1/``period_s``, one after the other.
 
-    The sample time is ``sample_time_s`` [s]. Each sine lasts ``waiting_periods`` for the
-    transient and ``periods`` to be used, all of ``period_s`` [s]. ``amplitude`` is one number
-    or one per frequency. Every step starts at phase zero, so there is no jump. Raises
+    ``frequency_hz`` are in Hz, ``period_s`` and the sample time ``sample_time_s`` in s. Each sine lasts
+    ``waiting_periods`` periods for the transient and ``periods`` periods to use. ``amplitude`` is one
+    number or one per frequency. Every step starts at phase zero, so there is no jump. Raises
     InputError naming the field.
     """
     n = whole_samples("period_s", period_s, sample_time_s)

@@ -1,4 +1,4 @@
-"""A local page to look at logs beside a simulator, and to try causes by hand."""
+"""A local web page that shows logs beside a simulator and lets a user try causes by hand."""
 
 from axisight.explore.session import Session
 

@@ -1,4 +1,4 @@
-"""What the page asks for, worked out in its own thread."""
+"""Results that the page asks for, computed in the page's own thread."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from axisight.gap.simulator.own_parameters import with_values
 Array = NDArray[np.float64]
 Curve = tuple[Array, Array]
 
-# Dots of a scatter.
+# Most dots of a scatter.
 _DOTS = 6000
 _FREQUENCIES = 300
 
 
 @dataclass(frozen=True)
 class Answer:
-    """One log under the simulator as given, as chosen, and as pinned."""
+    """One log under the simulator as given, as chosen and as pinned."""
 
     log: int
     version: Version
@@ -32,7 +32,7 @@ class Answer:
 
 
 def answer(session: Session, log: int, version: Version, pins: dict[str, Version]) -> Answer:
-    """Return what a change of causes shows at once; raises InputError as `Session.see`."""
+    """Return what changed causes show at once; raises InputError as `Session.see` does."""
     return Answer(
         log,
         version,
@@ -44,11 +44,12 @@ def answer(session: Session, log: int, version: Version, pins: dict[str, Version
 
 @dataclass(frozen=True)
 class Rest:
-    """What may come later: the gap of all validation logs (n_axes,), and what the open tab shows.
+    """Slow results: the gap of all validation logs (n_axes,) [1], and the content of the open tab.
 
-    ``held_given`` and ``held_floor``: the same of the simulator as given, and of noise alone.
-    ``against``: dots and means by version; ``orders`` and ``responses`` by version, and of the latter what is
-    measured; ``problem``: why one of them cannot be.
+    - ``held_given``, ``held_floor``: the same gap for the simulator as given, and for noise alone.
+    - ``against``: dots and bin means by version.
+    - ``orders``, ``responses``: by version; the latter also as measured.
+    - ``problem``: why a result is missing.
     """
 
     axis: int
@@ -62,7 +63,7 @@ class Rest:
 
 
 def rest(session: Session, last: Answer, axis: int, tab: str, against: Against) -> Rest:
-    """Return what is shown once nothing moves; ``axis`` from 0."""
+    """Return the slow results, for when no slider moves; ``axis`` from 0."""
     held = session.held_gap(last.version)
     log, versions = session.logs[last.log], {"given": last.given, "now": last.now}
     counted = session.view.counted(log)[:, 0]

@@ -1,4 +1,4 @@
-"""The explorer put together: from what a user hands over to a page that is served."""
+"""Assembly of the explorer: from the user's inputs to a served page."""
 
 from __future__ import annotations
 
@@ -24,27 +24,27 @@ def prepared(
     verdict: Path | None,
     progress: Callable[[str, int, int], None],
 ) -> State:
-    """Return the state that a page begins with; ``progress`` is told how far it is.
+    """Return the state that a page starts with; ``progress`` is called with label, done and total.
 
-    ``verdict``: file of an earlier diagnosis. Raises InputError as `Session`, and for a verdict that is none
-    or not of this robot.
+    ``verdict``: file of an earlier diagnosis. Raises InputError as `Session` does, and for a file that is no
+    verdict or belongs to another robot.
     """
     said = None if verdict is None else read_said(verdict)
     progress("preparing the simulator", 0, 2)
     given = (inputs.name, inputs.robot, inputs.estimation, inputs.validation)
     session = Session(*given, settings, inputs.simulated)
     progress("preparing the simulator", 1, 2)
-    # The page opens where there is most to see; the curves there are ready.
+    # The page opens at the largest gap, with its curves already computed.
     log, axis = session.largest_gap()
     progress("preparing the simulator", 2, 2)
-    # One thread is left to the sliders; threads change no result.
+    # Keeps one thread for the sliders; the number of threads changes no result.
     fewer = replace(settings, threads=max(1, settings.threads - 1))
     work = Background(*given, fewer, inputs.simulated)
     return State(session, work, said, log, axis)
 
 
 def served(state: State, port: int = 0) -> Served:
-    """Return the running page of a state; raises InputError for a port in use."""
-    # In line with what the server gives: nothing from elsewhere.
+    """Return the server of a state's page; raises InputError for a port in use."""
+    # The server's content policy blocks other origins, so the resources must be inline.
     pn.extension(design="native", inline=True)
     return serve(lambda: Page(state).view(), port, state.title())

@@ -1,4 +1,4 @@
-"""A diagnosis beside the page: it says how far it is, and can be stopped."""
+"""A diagnosis that runs in the background: it reports progress and can be stopped."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from axisight.robot import Robot
 
 
 class _StoppedError(BaseException):
-    """Asked to stop; of no kind that anything on the way would take for a failed fit."""
+    """A request to stop; a BaseException, so that no handler of failed fits catches it."""
 
 
 class Background:
-    """A diagnosis in a thread of its own.
+    """A diagnosis in its own thread.
 
-    ``state``: ``idle``, ``running``, ``stopping``, ``stopped``, ``failed`` or ``done``; ``says``: how far it
-    is, or why it failed; ``share`` of the present step that is done [1]; ``document``: the verdict, once it is done.
+    - ``state``: ``idle``, ``running``, ``stopping``, ``stopped``, ``failed`` or ``done``.
+    - ``says``: the present step, or why the diagnosis failed.
+    - ``share``: how much of the present step is done [1].
+    - ``document``: the verdict, once the state is ``done``.
     """
 
     def __init__(
@@ -43,11 +45,11 @@ class Background:
 
     @property
     def busy(self) -> bool:
-        """Whether it is at work."""
+        """Whether the diagnosis is running."""
         return self.state in ("running", "stopping")
 
     def start(self) -> None:
-        """Begin, unless it is at work already."""
+        """Start the diagnosis unless it is running."""
         if self.busy:
             return
         self._stop.clear()
@@ -56,13 +58,13 @@ class Background:
         self._thread.start()
 
     def stop(self) -> None:
-        """Ask it to end; it does so at its next step."""
+        """Ask the diagnosis to stop; it does so at its next step."""
         if self.state == "running":
             self.state = "stopping"
             self._stop.set()
 
     def wait(self, timeout_s: float | None = None) -> None:
-        """Wait for its end."""
+        """Wait until the diagnosis ends, at most ``timeout_s`` seconds."""
         if self._thread is not None:
             self._thread.join(timeout_s)
 

@@ -1,4 +1,4 @@
-"""Work beside the server's loop, whose results come back into it."""
+"""Work outside the server's event loop, with results handed back into it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from tornado.ioloop import IOLoop
 
 
 class Beside:
-    """One thread for the work of one visit of the page; made in the server's loop.
+    """A worker thread for one visit of the page; create it in the server's event loop.
 
-    ``document``: the page's, in whose turn results are taken.
+    ``document``: the document of the page, which takes the results.
     """
 
     def __init__(self, document: Any) -> None:
@@ -22,11 +22,11 @@ class Beside:
         self._closed = False
 
     def submit(self, task: Callable[[], Any], then: Callable[[Any], None]) -> None:
-        """Do a task in the thread, and call ``then`` with its result, or its error, in the loop."""
+        """Run a task in the thread; call ``then`` with its result or its exception in the event loop."""
         self._pool.submit(self._do, task, then)
 
     def close(self) -> None:
-        """Take no more work, and give no more results."""
+        """Stop accepting work and delivering results."""
         self._closed = True
         self._pool.shutdown(wait=False, cancel_futures=True)
 
@@ -34,10 +34,10 @@ class Beside:
         try:
             found = task()
         except Exception as error:
-            # Whatever it is: a page that waits for an answer that never comes looks alive.
+            # Every error: a page whose answer never comes looks alive.
             found = error
-        # Through the loop, not straight to the document: that may be holding back events just now, and an
-        # event that another thread adds to those is lost when they are taken out of it.
+        # Through the loop, not straight to the document. The document may be holding back events, and loses
+        # those that another thread adds while it takes them out.
         self._loop.add_callback(self._hand_over, partial(then, found))
 
     def _hand_over(self, result: Callable[[], None]) -> None:

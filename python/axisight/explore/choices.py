@@ -1,4 +1,4 @@
-"""Effects as somebody chooses them: where they can act, begun at a usual size, and the range of a slider."""
+"""Effects as a user chooses them: places, usual sizes and slider ranges."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from axisight.robot import Robot
 
 Place = int | tuple[int, int] | None
 
-# A slider reaches so many times the usual size of its parameter: bounds alone may be a million of it.
+# A slider reaches so many typical sizes; bounds alone may be a million of them.
 _REACH = 5.0
-# Limits that switch an effect off lie that many usual sizes away from where it matters.
+# A limit that switches an effect off lies so many typical sizes away.
 _FAR = 1e3
 
 
 def places(info: EffectInfo, n_axes: int) -> list[Place]:
-    """Return where an effect can act on an arm: axes from 1, ordered pairs of them, or None for all of it."""
+    """Return the places where an effect can act on an arm: axes from 1, ordered pairs of axes, or None."""
     if info.scope == "arm":
         return [None]
     axes = range(1, n_axes + 1)
@@ -26,14 +26,14 @@ def places(info: EffectInfo, n_axes: int) -> list[Place]:
 
 
 def at_place(name: str, place: Place, values: dict[str, float]) -> Effect:
-    """Return an effect at a place; raises InputError as `Effect`."""
+    """Return an effect at a place; raises InputError as `Effect` does."""
     if isinstance(place, tuple):
         return Effect(name, None, values, place)
     return Effect(name, place, values)
 
 
 def usual(name: str, place: Place) -> Effect:
-    """Return an effect of a usual size: its first amplitude as large as is typical, others at nothing."""
+    """Return an effect with its first amplitude at its typical size and the others neutral."""
     parameters = effect_info(name).parameters
     values = {p.name: p.neutral for p in parameters}
     first = next(p for p in parameters if p.role == "amplitude")
@@ -43,11 +43,11 @@ def usual(name: str, place: Place) -> Effect:
 
 
 def usable(robot: Robot, *, inverse_dynamics: bool = False) -> dict[str, list[Place]]:
-    """Return the effects that a robot can have, by name, and their places.
+    """Return the effects that a robot can have, by name, with their places.
 
-    Left out: effects that the robot refuses everywhere, such as a play of a rigid transmission. By
-    ``inverse_dynamics`` also those that change no torque computed from the measured motion, by the table
-    of effects, such as a delay of the sensor.
+    Effects that the robot refuses on every axis are left out, such as backlash of a rigid transmission. With
+    ``inverse_dynamics``, effects that change no torque computed from the measured motion are left out too,
+    such as a sensor delay.
     """
     found = {}
     for name, info in effect_table().items():
@@ -68,9 +68,9 @@ def _possible(robot: Robot, name: str, place: Place) -> bool:
 
 
 def slider_range(p: EffectParameter, value: float) -> tuple[float, float]:
-    """Return from where to where a slider goes: some usual sizes about nothing, within the bounds.
+    """Return the ends of a slider: a few typical sizes about the neutral value, within the bounds.
 
-    ``value`` is inside, however large.
+    The range always contains ``value``.
     """
     middle = p.neutral if abs(p.neutral) < _FAR * p.typical else 0.0
     if p.role == "shape":
@@ -80,12 +80,12 @@ def slider_range(p: EffectParameter, value: float) -> tuple[float, float]:
 
 
 def in_bounds(effect: Effect) -> Effect:
-    """Return the same with each value within the bounds of the table."""
+    """Return the effect with every value clipped to the bounds of the table."""
     parameters = effect_info(effect.name).parameters
     pairs = zip(parameters, effect.values(), strict=True)
     return effect.with_values({p.name: min(max(v, p.lower), p.upper) for p, v in pairs})
 
 
 def with_effect(effects: Sequence[Effect], new: Effect) -> tuple[Effect, ...]:
-    """Return effects with one more, in the place of one of the same name and axis."""
+    """Return the effects with one more; it replaces one of the same name and axis."""
     return (*(e for e in effects if e.label != new.label), new)

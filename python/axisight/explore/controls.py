@@ -1,4 +1,4 @@
-"""The list of causes: one card each with its sliders, and what adds another."""
+"""The list of causes: a card with sliders for each, and the controls that add one."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from axisight.explore.state import State
 from axisight.gap.facts.axis_names import own_name
 from axisight.report.wording import place
 
-# At most so wide, and never wider than the screen.
+# Limited by this width and by the screen.
 _FITTING = {"sizing_mode": "stretch_width", "max_width": 380}
-# Of the range of a slider.
+# Steps over the range of a slider.
 _STEPS = 400
 
 
 class Controls:
-    """Sliders for the causes of a state; ``changed`` is called with what went wrong, or nothing."""
+    """Sliders for the causes of a state; calls ``changed`` with an error message, empty without an error."""
 
     def __init__(self, state: State, changed: Callable[[str], None]) -> None:
         self._state, self._changed = state, changed
         self._names = state.session.robot.axis_names
         self._none = pn.pane.HTML(words.text("None: the simulator as given.", "quiet"))
         self._none.stylesheets = [words.STYLE]
-        # Cards that were made stay and are hidden: a browser that takes elements out while others are
-        # drawn can be left with one twice, and loses a press on what is drawn anew.
+        # Cards stay and are hidden. A browser that removes elements while it draws others can show one twice,
+        # and loses clicks on redrawn ones.
         self._cards = pn.Column(self._none, **_FITTING)
         self._made: dict[str, _Card] = {}
         mode = state.session.view.mode
@@ -50,11 +50,11 @@ class Controls:
         self._show()
 
     def view(self) -> Any:
-        """Return the cards and what adds one."""
+        """Return the view: the cards and the controls that add a cause."""
         return pn.Column(self._cards, pn.FlexBox(self._name, self._place, self._add), **_FITTING)
 
     def add(self, effect: Effect) -> None:
-        """Put a cause in."""
+        """Add a cause."""
         try:
             self._state.add(effect)
         except AxisightError as error:
@@ -98,7 +98,7 @@ class Controls:
 
 
 def _at(where: Place, names: Sequence[str]) -> str:
-    """Return a place in words, with the joint of an axis that has a name of its own."""
+    """Return a place in words, with the joint's name if it has one."""
     if isinstance(where, tuple):
         return place(None, where)
     name = "" if where is None else own_name(where, names)
@@ -106,7 +106,7 @@ def _at(where: Place, names: Sequence[str]) -> str:
 
 
 class _Card:
-    """What is shown of a cause: its name, what takes it out, a slider for every parameter."""
+    """The card of a cause: its name, a button that removes it, a slider per parameter."""
 
     def __init__(
         self,
@@ -131,7 +131,7 @@ class _Card:
         )
 
     def take(self, effect: Effect) -> None:
-        """Show the values of an effect, in a range that suits them."""
+        """Show the values of an effect, in fitting ranges."""
         for p, slider, value in zip(self._parameters, self._sliders, effect.values(), strict=True):
             shown = _shown(p, value)
             if slider.value != shown["value"]:
@@ -139,7 +139,7 @@ class _Card:
 
 
 def _shown(p: EffectParameter, value: float) -> dict[str, float]:
-    """Return the range of a slider, and where it stands."""
+    """Return the range and the position of a slider."""
     low, high = slider_range(p, value)
     value = min(max(value, p.lower), p.upper)
     return {"start": low, "end": high, "step": (high - low) / _STEPS, "value": value}
@@ -159,14 +159,14 @@ def _slider(p: EffectParameter, value: float) -> Any:
     )
 
 
-# Ends of names that are units, which stand beside them.
+# Units at the ends of names, which the page shows beside them.
 _UNITS: tuple[str, ...]
 _UNITS = ("_nm_s2_rad2", "_nm_s2_rad", "_nm_s_rad", "_nm_rad3", "_nm_rad", "_rad_nm", "_rad_s")
 _UNITS += ("_kg_m2", "_rad", "_nm", "_kg", "_hz", "_1_w", "_s", "_m")
 
 
 def _plain(name: str) -> str:
-    """Return the name of a parameter in words, without its unit."""
+    """Return a parameter's name in words, without its unit."""
     for unit in _UNITS:
         if name.endswith(unit):
             return noun(name.removesuffix(unit))

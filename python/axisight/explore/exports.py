@@ -1,4 +1,4 @@
-"""What leaves the explorer: the robot with its causes, the verdict, a figure."""
+"""Files from the explorer: the robot with its causes, the verdict, a figure."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from axisight.robot_file.document import render
 
 
 def robot_text(session: Session, made: Version) -> str:
-    """Return the robot file of a version; raises RobotError for values that no body has."""
+    """Return the robot file of a version; raises RobotError for values that no body can have."""
     own = {e.label for e in session.robot.effects}
     values, gains = split(session.robot, dict(made.robot_values))
-    # One put in by hand takes the place of what was fitted.
+    # A cause set by hand replaces the fitted one.
     by_hand = {e.label for e in made.effects}
     fitted = [e for e in gains if e.label not in by_hand]
     acting = [e for e in (*made.effects, *fitted) if e.acts]
     removed = [e for e in made.effects if not e.acts and e.label in own]
     found = identified(values, Provenance("explorer"), effects=acting, removed=removed)
     text = render(session.robot, found, "")
-    # The head of an identification names a file of errors beside it, which values by hand have not.
+    # The head names a file of identified errors, which values set by hand do not have.
     body = "".join(text.splitlines(True)[1:])
     causes = ", ".join(e.label for e in acting) or "none"
     return f"# Axisight {version('axisight')}, explorer. Causes put in by hand: {causes}.\n{body}"
 
 
 def verdict_text(document: dict[str, Any]) -> str:
-    """Return a verdict as its file."""
+    """Return the text of a verdict file."""
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
@@ -45,7 +45,7 @@ _POINTS = 4000
 
 
 def figure_png(session: Session, log: int, axis: int, given: Seen, seen: Seen, unit: str) -> bytes:
-    """Return a figure of one log and axis (from 0): torque above, residual below."""
+    """Return a PNG figure of one log and axis (from 0): torque above, residual below."""
     time, counts = session.logs[log].time_s, session.counts(log)
     figure = matplotlib.figure.Figure(figsize=(10, 6), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True)
@@ -59,7 +59,7 @@ def figure_png(session: Session, log: int, axis: int, given: Seen, seen: Seen, u
     for panel, values, color, label in curves:
         t, v = thin(time, np.where(counts, values[:, axis], np.nan), _POINTS)
         panel.plot(t, v, color=color, lw=0.8, label=label)
-    # Names are other people's: a dollar sign in one would be read as a formula.
+    # Names come from users; a dollar sign would start a formula.
     name = session.logs[log].name
     label = axis_label(axis + 1, session.robot.axis_names)
     title = f"{session.robot.name}, {name}, axis {label}\n{session.filter_words}"

@@ -1,4 +1,4 @@
-"""Frequency responses that logs show, to be held against those of the model."""
+"""Measured frequency responses from logs, for comparison with the model."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ from axisight.records.periodic import PeriodicRecords
 
 Array = NDArray[np.float64]
 
-# Half width of the window over frequency, and for how many lines it has to do at least.
+# Half width of the frequency window, and the least number of lines it must span.
 _BANDWIDTH_HZ = 1.0
 _LEAST_LINES = 8
-# Standard error of a gain that is shown, of the gain.
+# Largest relative standard error of a gain that is shown.
 _UNSURE = 0.3
-# Dots per curve.
+# Most dots per curve.
 _DOTS = 120
 
 
 def measured_gains(logs: Sequence[Log]) -> tuple[Array, Array] | None:
     """Return frequencies [Hz] (n_freq,) and gains (n_freq, n_outputs, n_inputs) [rad/Nm] from logs.
 
-    From motor torques to motor angles: the response of the angles to the velocity references, by that of the
-    torques (joint input-output, Wernholt (2004), section 3.4.2), each by spectral analysis of all logs that are
-    as long as most. Logs need be of no kind, and noise in the loop does not bias it. NaN where the standard error,
-    of noise and distortion as if they were independent, is above three tenths of the gain.
+    The gain from motor torques to motor angles is the response of the angles to the velocity references,
+    divided by that of the torques (joint input-output method, Wernholt (2004), section 3.4.2). Each response
+    is a spectral analysis of all logs that have the most common length. Any excitation will do, and noise in
+    the loop causes no bias. A gain is NaN if its standard error is above 0.3 of it, with noise and distortion
+    taken as independent.
 
-    None without references, and where logs are too few, or too short, to tell the axes apart.
+    Returns None without references, and if logs are too few or too short to separate the axes.
     """
     lengths = [len(log.time_s) for log in logs if log.velocity_ref_rad_s is not None]
     if not lengths:
@@ -48,7 +49,7 @@ def measured_gains(logs: Sequence[Log]) -> tuple[Array, Array] | None:
     frequency_hz, to_torque, torque_variance = torque
     _, to_angle, angle_variance = angle
     response, _ = right_divide(to_angle, to_torque)
-    # To first order, dG = (dY - G dU) U^-1.
+    # First order: dG = (dY - G dU) U^-1.
     spread = np.abs(invert(to_torque)[0]) ** 2
     power = np.abs(response) ** 2
     variance = (angle_variance + power @ torque_variance) @ spread
@@ -65,7 +66,7 @@ def _by_references(
     records = PeriodicRecords(step_s, references[:, None], np.array(signals)[:, None], lines)
     width = max(_BANDWIDTH_HZ, _LEAST_LINES / (n * step_s))
     found = spectral_analysis(records, bandwidth_hz=width, taper="hann")
-    # Below, the window smears what is static over all that moves.
+    # Lower frequencies would contain static parts smeared by the window.
     first = min(round(1.5 * width * n * step_s), len(lines))
     at = np.unique(np.geomspace(first, len(lines), _DOTS).astype(int) - 1)
     response, variance = (

@@ -1,4 +1,4 @@
-"""The page: what is chosen on the left, curves on the right; simulations run beside the server's loop."""
+"""The page: choices on the left, curves on the right; simulations run outside the event loop."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from axisight.gap.facts.compared_quantity import torque_of
 
 Array = NDArray[np.float64]
 
-# What is slow waits until a slider has rested so long.
+# Slow results wait until the sliders have rested for this long.
 _REST_MS = 250
 _POLL_MS = 300
-# Beside one another where both fit, else below; nothing is wider than the screen.
+# Side by side if both columns fit, else stacked; never wider than the screen.
 _LEFT = {"flex": "0 1 420px", "min-width": "min(100%, 300px)", "margin-right": "15px"}
 _RIGHT = {"flex": "1 1 480px", "min-width": "min(100%, 320px)"}
 
@@ -44,17 +44,17 @@ _TABS = ("time", "against", "orders", "bands", "responses")
 
 
 def _whole(duration_s: float) -> tuple[float, float]:
-    """Return the range of time of a whole log, its ends free of the frame."""
+    """Return the time range of a whole log, with a margin to the frame."""
     return -0.01 * duration_s, 1.01 * duration_s
 
 
 def _told(error: Exception) -> str:
-    """Return what an error says, with its kind where it is none of ours."""
+    """Return the message of an error, with its type if axisight did not raise it."""
     return str(error) if isinstance(error, AxisightError) else f"{type(error).__name__}: {error}"
 
 
 class Page:
-    """One visit of the page; choices live in ``state``, which all visits share."""
+    """One visit of the page; all visits share the choices in ``state``."""
 
     def __init__(self, state: State) -> None:
         self.state = state
@@ -85,7 +85,7 @@ class Page:
         pn.state.on_session_destroyed(lambda _context: self._beside.close())
 
     def _first(self) -> None:
-        """Draw everything once, so that no figure is ever without its ranges."""
+        """Draw everything once, so that every figure has its ranges."""
         state = self.state
         try:
             self._answered(answer(state.session, state.log, state.version(), dict(state.pins)))
@@ -102,7 +102,7 @@ class Page:
 
     def _build_choices(self) -> None:
         session, state = self.state.session, self.state
-        # By number: two logs may have one name.
+        # By number, because two logs may share a name.
         logs = {
             f"{i + 1}. {log.name} ({role})": i
             for i, (log, role) in enumerate(zip(session.logs, session.roles, strict=True))
@@ -188,7 +188,7 @@ class Page:
         )
         self._run.on_click(lambda _event: self._begin())
         self._stop.on_click(lambda _event: self.state.background.stop())
-        # A list, not a box to tick: screen readers find no name beside a box here.
+        # A list instead of a checkbox, whose label screen readers do not find here.
         self._refitted = pn.widgets.Select(
             name="own parameters",
             options={"as given": False, "re-fitted": True},
@@ -199,7 +199,7 @@ class Page:
         self._polls: Any = None
         self._show_said()
         if self.state.background.state != "idle":
-            # Begun, or brought to its end, while an earlier visit looked on.
+            # Another visit may have started or finished the diagnosis.
             self._poll()
 
     def _begin(self) -> None:
@@ -212,7 +212,7 @@ class Page:
         self._look()
 
     def _look(self) -> None:
-        """Show how far the diagnosis is, and what it said once it is done."""
+        """Show the progress of the diagnosis, and its verdict at the end."""
         work = self.state.background
         self._run.disabled, self._stop.disabled = work.busy, not work.busy
         kind = "problem" if work.state == "failed" else "quiet"
@@ -257,13 +257,13 @@ class Page:
     # Simulation
 
     def changed(self, problem: str = "") -> None:
-        """Simulate again: causes changed, or could not be (``problem``)."""
+        """Simulate again after a change of causes; ``problem`` says why a change failed."""
         self._say(problem)
         if not problem:
             self.ask()
 
     def ask(self) -> None:
-        """Have what is chosen simulated; of several wishes meanwhile only the last counts."""
+        """Request a simulation of the present choice; only the last request counts."""
         self._wanted = True
         if not self._busy:
             self._begin_answer()
@@ -324,7 +324,7 @@ class Page:
             if seen is not None:
                 shown = (seen.simulated, seen.residual, seen.position_rad)
             for name, values in zip(("torque", "residual", "position"), shown, strict=True):
-                # Motions are known at the ends of a log, too.
+                # Positions are known at the ends of a log too.
                 shows = None if name == "position" else counts
                 self._curves[name].show(key, log.time_s, values, axis, shows)
         for name, label in (
@@ -436,7 +436,7 @@ class Page:
         return tabs
 
     def view(self) -> Any:
-        """Return the page."""
+        """Return the whole page."""
         left = pn.Column(
             pn.FlexBox(self._log, self._axis),
             self._gaps,

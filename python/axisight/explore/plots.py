@@ -1,4 +1,4 @@
-"""The figures of the page: curves that keep their peaks however long a log is."""
+"""The figures of the page: curves keep their peaks however long the log."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 # About two for each pixel of a wide screen.
 _POINTS = 2400
-# Of what is shown, drawn beyond its ends, so that a small move has curves already.
+# Share of the visible range drawn beyond its ends, so that small moves show curves at once.
 _MARGIN = 0.2
 _TOOLS = "xpan,xwheel_zoom,xbox_zoom,reset,save"
 _TALL, _LOW = 260, 190
@@ -32,7 +32,7 @@ CURVES = {
 
 
 class Curves:
-    """One figure over time; curves by the keys of `CURVES`."""
+    """One figure over time, with curves by the keys of `CURVES`."""
 
     def __init__(self, name: str, keys: Sequence[str], height: int, x_range: Range1d) -> None:
         self._full: dict[str, tuple[Array, Array]] = {}
@@ -71,9 +71,9 @@ class Curves:
         axis: int,
         counts: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Show a column, of an axis from 0, of values (n, n_axes), or none; not again if it is there.
+        """Set a curve to one axis (from 0) of values (n, n_axes), or remove it; skip equal values.
 
-        ``counts`` (n,): samples that are drawn; by default all.
+        ``counts`` (n,): which samples are drawn; None draws all.
         """
         there = self._of.get(key)
         if there is not None and there[0] is values and there[1] == axis:
@@ -90,7 +90,7 @@ class Curves:
         self.draw([key])
 
     def draw(self, keys: Sequence[str] | None = None) -> None:
-        """Show curves, all by default, as closely as the zoom asks for."""
+        """Draw curves (all by default) at the resolution of the zoom."""
         window = (float(self.figure.x_range.start), float(self.figure.x_range.end))
         for key in keys if keys is not None else tuple(self.sources):
             source = self.sources.get(key)
@@ -111,10 +111,10 @@ def _in_window(time_s: Array, values: Array, window: tuple[float, float]) -> tup
 
 
 def peaks(time_s: Array, values: Array, points: int) -> tuple[Array, Array]:
-    """Return about ``points`` samples of a curve (n,): the least and the largest of each stretch.
+    """Return about ``points`` samples of a curve (n,): minimum and maximum of each stretch.
 
-    As `axisight.report.curves.thin`, for stretches of one length, at once. One without finite values keeps a
-    NaN as a gap.
+    Like `axisight.report.curves.thin`, but vectorized, for stretches of one length. A stretch without finite
+    values keeps one NaN as a gap.
     """
     n = len(values)
     if n <= points:
@@ -133,7 +133,7 @@ def peaks(time_s: Array, values: Array, points: int) -> tuple[Array, Array]:
 
 
 def time_figures(x_range: Range1d) -> dict[str, Curves]:
-    """Return torque, residual and position over one range of time, which zooms them all."""
+    """Return the figures of torque, residual and position, which zoom together."""
     pins = ("A", "B")
     out = {
         "torque": Curves("torque", ("measured", "given", "now", *pins), _TALL, x_range),
@@ -145,7 +145,7 @@ def time_figures(x_range: Range1d) -> dict[str, Curves]:
 
 
 class Regard:
-    """The residual against a quantity: samples as dots, means in bins as lines."""
+    """The residual over a quantity: samples as dots, bin means as lines."""
 
     def __init__(self) -> None:
         self.figure = _plain("figure-against", "", "residual")
@@ -164,13 +164,13 @@ class Regard:
         self.figure.add_layout(_legend(items), "above")
 
     def show(self, key: str, x: Array, y: Array) -> None:
-        """Show the means of a version (n_bins,)."""
+        """Show the bin means (n_bins,) of a version."""
         self.means[key].data = {"x": x, "y": y}
         self._items[key].visible = len(x) > 0
 
 
 class Orders:
-    """Amplitude by order of the motor angle, as given and as chosen."""
+    """Amplitude over order of the motor angle, as given and as chosen."""
 
     def __init__(self) -> None:
         self.figure = _plain("figure-orders", "order of the motor angle", "amplitude")
@@ -186,22 +186,22 @@ class Orders:
         self.figure.add_layout(_legend(list(self._items.values())), "above")
 
     def show(self, key: str, orders: Array, amplitude: Array) -> None:
-        """Show the amplitudes (n_orders,) that are known."""
+        """Show the finite amplitudes (n_orders,)."""
         source, shift = self.sources[key]
         known = np.isfinite(amplitude)
         source.data = {"x": orders[known] + shift, "y": amplitude[known]}
         self._items[key].visible = bool(known.any())
 
 
-# Of the largest gain of a figure [1]. What is smaller no sensor resolves, and what 16 digits leave of an axis that
-# does not move is rounding: a curve of it would only stretch the scale.
+# Smallest gain that is drawn, relative to the largest of a figure [1]. No sensor resolves less, and the
+# rounding errors of an axis that does not move would stretch the scale.
 _ROUNDING = 1e-12
 
 
 class Responses:
-    """Gain from the torque of one motor to the angles of all.
+    """Gain from one motor's torque to all motor angles.
 
-    Axes by colour, versions by the kind of line: a legend of both has an entry for each that is drawn.
+    Axes differ by colour, versions by line style; the legend has one entry for each.
     """
 
     def __init__(self, n_axes: int, names: Sequence[str] = ()) -> None:
@@ -238,11 +238,11 @@ class Responses:
         )
 
     def of(self, axis: int) -> None:
-        """Say whose torque it is, of an axis from 0."""
+        """Name the axis (from 0) whose torque excites."""
         self.figure.title.text = f"Angle of each motor per torque of motor {axis + 1}"
 
     def show(self, curves: Mapping[str, tuple[Array, Array]]) -> None:
-        """Show frequencies [Hz] (n_freq,) and gains (n_freq, n_outputs) [rad/Nm] by version, those that are known."""
+        """Show frequencies [Hz] (n_freq,) and gains (n_freq, n_outputs) [rad/Nm] by version."""
         for key, sources in self.sources.items():
             frequency_hz, gain = curves.get(key, (np.zeros(0), np.zeros((0, len(sources)))))
             for source, column in zip(sources, levels(gain).T, strict=True):
@@ -253,7 +253,7 @@ class Responses:
 
 
 def levels(gain: Array) -> Array:
-    """Return gains (n_freq, n_outputs) in dB; NaN where one is unknown, or rounding beside the largest."""
+    """Return gains (n_freq, n_outputs) in dB; NaN for unknown gains and for rounding errors."""
     if gain.size == 0:
         return gain
     largest = np.max(np.where(np.isfinite(gain), gain, 0.0))
@@ -265,7 +265,7 @@ def _seen(source: ColumnDataSource) -> bool:
     return bool(np.isfinite(np.asarray(source.data["y"], dtype=float)).any())
 
 
-# Columns of a legend above a figure, as many as a phone has room for.
+# Columns of a legend above a figure; a phone has room for no more.
 _LEGEND_COLUMNS = 3
 
 

@@ -1,4 +1,4 @@
-"""The residual against what it may hang on: speed, angle, load, time; and orders of the motor angle."""
+"""The residual over speed, angle, load or time, and by orders of the motor angle."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ AGAINST: dict[Against, str] = {
     "time": "time",
 }
 
-# Of the low-pass that speeds and loads are taken with, as those of regimes are.
+# Corner of the low-pass for speeds and loads, the same as for regimes.
 _SMOOTH_HZ = 20.0
 _BINS = 40
-# A bin with fewer samples says nothing of its own.
+# Fewest samples of a bin that is shown.
 _LEAST = 5
 
 
 def quantity(log: Log, axis: int, against: Against) -> Array:
-    """Return a quantity of one axis (from 0) along a log (n,): [rad/s], [rad], [Nm], or [s]."""
+    """Return a quantity of one axis (from 0) along a log, (n,): [rad/s], [rad], [Nm] or [s]."""
     cutoff = min(_SMOOTH_HZ, 0.4 / log.sample_time_s)
     if against == "time":
         return log.time_s
@@ -41,9 +41,9 @@ def quantity(log: Log, axis: int, against: Against) -> Array:
 
 
 def in_bins(x: Array, residual: Array) -> tuple[Array, Array, Array]:
-    """Return middles of equal bins of ``x`` (n,), mean and rms of a residual (n,) in each; (n_bins,).
+    """Return centres of equal bins of ``x`` (n,), mean and rms of a residual (n,) in each bin; all (n_bins,).
 
-    Bins of too few samples are left out.
+    Bins with fewer than five samples are left out.
     """
     known = np.isfinite(residual)
     x, residual = x[known], residual[known]
@@ -58,15 +58,15 @@ def in_bins(x: Array, residual: Array) -> tuple[Array, Array, Array]:
     return (edges[:-1] + edges[1:])[enough] / 2, mean, rms
 
 
-# Waves of the highest order at usual speeds lie below.
+# The highest order at usual speeds lies below this frequency.
 _ORDER_RATE_HZ = 1000.0
 
 
 def order_spectrum(log: Log, axis: int, residual: Array) -> tuple[Array, Array]:
     """Return orders of the motor angle (n_orders,) and the amplitude of each in a residual (n,) [Nm].
 
-    Least squares on cosine and sine of one order at a time; NaN where the motor turned too little, or too
-    fast for the sample rate, to tell.
+    A least-squares fit of cosine and sine for one order at a time. NaN if the motor turned too little, or too
+    fast for the sample rate.
     """
     orders = np.arange(1, HIGHEST_ORDER + 1)
     if not np.isfinite(residual).all():
@@ -88,7 +88,7 @@ def order_spectrum(log: Log, axis: int, residual: Array) -> tuple[Array, Array]:
     cs = (c * np.conj(s)).real @ weights
     rc, rs = along.real[: len(orders)], along.real[len(orders) :]
     apart = cc * ss - cs**2
-    # An order that hardly turns has cosine and sine alike.
+    # Over a small turn, cosine and sine of an order are nearly collinear.
     seen = apart > 1e-4 * np.maximum(cc * ss, (0.05 * len(kept)) ** 2)
     with np.errstate(invalid="ignore", divide="ignore"):
         a, b = (ss * rc - cs * rs) / apart, (cc * rs - cs * rc) / apart
@@ -100,7 +100,8 @@ def responses(
 ) -> NDArray[np.complex128]:
     """Return the response from motor torques to motor angles, (n_freq, n_axes, n_axes) [rad/Nm].
 
-    Linear, at the operating point, as a sampled loop sees it. Raises InputError where effects have none.
+    Linear, at the operating point, as a sampled loop sees it. Raises InputError for effects without a linear
+    response.
     """
     found = robot.zoh_response(frequency_hz, effects=effects)
     return np.asarray(found.values)

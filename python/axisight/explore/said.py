@@ -1,4 +1,4 @@
-"""What a diagnosis said, read from its verdict: causes to put in, re-fitted values, the gap."""
+"""The content of a verdict for the explorer: causes, re-fitted values, the gap."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from axisight.errors import InputError
 from axisight.explore.choices import Place, at_place
 from axisight.logs.columns import describe_validation
 
-# Verdicts are kilobytes.
+# Verdicts are a few kilobytes.
 _LARGEST = 16 * 2**20
 
 
 class _Open(BaseModel):
-    """A part of a verdict, of which the rest is not needed here."""
+    """A part of a verdict; other fields are ignored."""
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
@@ -63,7 +63,7 @@ class _Verdict(_Open):
 
 @dataclass(frozen=True)
 class SaidCause:
-    """A cause of a verdict; ``intervals``: 95 % interval of each of its parameters."""
+    """A cause of a verdict; ``intervals``: 95 % interval of each parameter."""
 
     effect: Effect
     probability: float | None
@@ -74,9 +74,12 @@ class SaidCause:
 class Said:
     """A verdict as the explorer uses it.
 
-    ``refit``: relative change [1] of parameters of the simulator; ``before``, ``after`` and ``floor``: gap
-    per axis over the validation logs [1], None where a simulation broke off. ``document`` is the whole.
-    Texts are those of whoever wrote the verdict.
+    - ``refit``: relative changes [1] of the simulator's parameters.
+    - ``before``, ``after``, ``floor``: gap per axis over the validation logs [1], None if a simulation broke
+      off.
+    - ``document``: the whole verdict.
+
+    Texts come from the file and are not escaped.
     """
 
     verdict: str
@@ -91,7 +94,7 @@ class Said:
 
 
 def read_said(path: Path | str) -> Said:
-    """Return what a verdict file says; raises InputError for a file that is none."""
+    """Return the content of a verdict file; raises InputError for a file that is no verdict."""
     file = usable_path(path, InputError, "--verdict")
     try:
         if file.stat().st_size > _LARGEST:
@@ -107,7 +110,7 @@ def read_said(path: Path | str) -> Said:
 
 
 def said(document: Any, source: str = "verdict") -> Said:
-    """Return what a verdict says, from its document; raises InputError naming ``source`` and field."""
+    """Return the content of a verdict's document; raises InputError naming ``source`` and field."""
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != "axisight.verdict/1":
         raise InputError(f"{source}: schema: expected axisight.verdict/1, got {shown(schema)}")

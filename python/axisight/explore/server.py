@@ -1,4 +1,4 @@
-"""The page's server: this machine only, a token to enter, nothing from outside."""
+"""The page's server: reachable from this machine only, with a token, and without outside resources."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ PATH = "/explore"
 
 @dataclass(frozen=True)
 class Served:
-    """A page that is served: where it is, with its token, its server, and who hears of signals."""
+    """A served page: its address with the token, its server, and the signals that it handles."""
 
     server: Any
     url: str
     handlers: dict[signal.Signals, Any]
 
     def run(self) -> None:
-        """Answer until interrupted."""
-        # Those of the command, which Panel replaced: a stop has its exit status.
+        """Serve until interrupted."""
+        # Panel replaced the command's signal handlers; those give a stop its exit status.
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self.handlers[number])
         try:
@@ -42,17 +42,17 @@ class Served:
 
 
 def free_port() -> int:
-    """Return a port of this machine that nobody uses."""
+    """Return a free port of this machine."""
     with socket.socket() as probe:
         probe.bind((ADDRESS, 0))
         return int(probe.getsockname()[1])
 
 
 def serve(page: Callable[[], Any], port: int = 0, title: str = "Axisight explorer") -> Served:
-    """Return the server of a page, not yet at work; ``page`` makes it anew for every visit.
+    """Return the server of a page, not yet running; ``page`` builds the page for every visit.
 
-    ``title``: of the page until it gives itself one.
-    ``port`` 0 takes a free one. Raises InputError for a port that is in use.
+    ``title``: title until the page sets its own. ``port`` 0 takes a free port. Raises InputError for a port
+    in use.
     """
     chosen = port or free_port()
     host = f"{ADDRESS}:{chosen}"
@@ -79,10 +79,10 @@ def serve(page: Callable[[], Any], port: int = 0, title: str = "Axisight explore
 
 
 class _Guard(Router):
-    """Lets requests through that know the token; the others get 403, files and sockets too.
+    """Pass requests that have the token; answer all others with 403, files and sockets too.
 
-    The token comes in the address once, and then as a cookie that only this address gets and no script
-    reads. Another name of this machine in ``Host`` is refused: a page elsewhere may have chosen it.
+    The token comes once in the address, then as a cookie that only this host gets and that no script can
+    read. A ``Host`` header with another name is refused: a page elsewhere may have chosen that name.
     """
 
     def __init__(self, application: Any, token: str, host: str) -> None:
@@ -90,7 +90,7 @@ class _Guard(Router):
         self._cookie = f"axisight_{host.rpartition(':')[2]}"
 
     def find_handler(self, request: HTTPServerRequest, **kwargs: Any) -> Any:
-        """Return what answers a request."""
+        """Return the handler of a request."""
         if request.host != self._host:
             return self._refused(request)
         given = [x.decode("utf-8", "replace") for x in request.arguments.get("token", [])]
@@ -110,22 +110,22 @@ class _Guard(Router):
 
 
 class _Enter(RequestHandler):
-    """Gives the cookie, and the page without the token in its address."""
+    """Set the cookie and redirect to the page without the token in its address."""
 
     def initialize(self, name: str, value: str) -> None:
-        """Keep name and value of the cookie."""
+        """Store name and value of the cookie."""
         self._name, self._value = name, value
 
     def get(self) -> None:
-        """Send the browser on."""
+        """Redirect the browser."""
         self.set_cookie(self._name, self._value, httponly=True, samesite="Strict")
         self.redirect(PATH)
 
 
 def _headers(host: str) -> type[OutputTransform]:
-    """Return what adds the content policy of the page to every answer.
+    """Return the transform that adds the page's content policy to every response.
 
-    Its libraries make scripts and styles as they go; all of them come from here.
+    The page's libraries create scripts and styles at run time, all from this server.
     """
     policy = "; ".join(
         [

@@ -1,4 +1,4 @@
-"""What the explorer shows of one log under one set of causes: curves, residual, gap; no page here."""
+"""Numbers of the explorer for one log and one set of causes: curves, residual, gap. No page code."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Runs that are kept: those of pins and of the last few steps.
+# Most cached runs: enough for pins and the last few steps.
 _KEPT = 24
 
 
 @dataclass(frozen=True)
 class Version:
-    """A simulator as somebody made it: effects of the machine and values of parameters [SI].
+    """A simulator version: effects of the machine and parameter values [SI].
 
-    ``effects``: those added to the robot's own, in the place of its own of the same name and axis.
+    ``effects`` come on top of the robot's own; they replace own effects of the same name and axis.
     """
 
     effects: tuple[Effect, ...] = ()
@@ -45,11 +45,11 @@ class Version:
 
     @classmethod
     def of(cls, effects: Sequence[Effect], values: Mapping[str, float] | None = None) -> Version:
-        """Return the version of these effects, each within the bounds of the table."""
+        """Return the version with these effects, each clipped to the bounds of the table."""
         return cls(tuple(map(in_bounds, effects)), tuple(sorted((values or {}).items())))
 
     def variant(self) -> Variant:
-        """Return it as simulations take it."""
+        """Return the version as an argument of simulations."""
         return Variant(dict(self.robot_values), self.effects)
 
 
@@ -60,11 +60,12 @@ AS_GIVEN = Version()
 class Seen:
     """A simulator on one log; torques (n, n_axes) [Nm, N on a prismatic axis], motor side.
 
-    ``residual``: simulated less measured. ``position_rad``: simulated motor position (n, n_axes) [rad, m],
-    None where the simulator takes the measured one. ``gap`` (n_axes,): rms of the residual over the
-    standard deviation of the measured torque [1]; ``bands`` (n_axes, n_bands): the part of it in each of
-    `Session.bands`, whose squares sum to that of the gap. ``broken_at_s``: from when on there are no
-    numbers, because the simulation broke off; None where it did not.
+    - ``residual``: simulated minus measured torque.
+    - ``position_rad``: simulated motor position (n, n_axes) [rad, m]; None if the simulator takes the
+      measured one.
+    - ``gap`` (n_axes,): rms of the residual over the standard deviation of the measured torque [1].
+    - ``bands`` (n_axes, n_bands): the gap in each of `Session.bands`; the squares sum to that of the gap.
+    - ``broken_at_s``: time at which the simulation broke off, with NaN from there on; None for a whole run.
     """
 
     measured: Array
@@ -79,8 +80,8 @@ class Seen:
 class Session:
     """A robot and its logs, to be simulated with any causes, one log at a time.
 
-    Compared as `axisight.diagnose` compares them: the gap of `AS_GIVEN` over the validation logs is its
-    ``gap.before_per_axis``.
+    Logs are compared as `axisight.diagnose` compares them: the gap of `AS_GIVEN` over the validation logs
+    equals ``gap.before_per_axis``.
     """
 
     def __init__(
@@ -92,9 +93,10 @@ class Session:
         settings: Settings | None = None,
         simulated: Sequence[Log] = (),
     ) -> None:
-        """Prepare what does not change; raises as `axisight.diagnose` for logs and robots it refuses.
+        """Prepare what does not change; raises as `axisight.diagnose` does for refused logs and robots.
 
-        ``simulated``: logs of the user's own simulator, as there: what is compared is theirs then.
+        ``simulated``: logs of the user's own simulator, which are then compared instead. Raises InputError
+        for logs with currents of unknown scale.
         """
         self.name, self.given = name, robot
         self.estimation, self.validation = tuple(estimation), tuple(validation)
@@ -121,10 +123,10 @@ class Session:
         return self.robot.n_axes
 
     def largest_gap(self) -> tuple[int, int]:
-        """Return the validation log and the axis, numbers from 0, where the gap as given is largest.
+        """Return the validation log and the axis (both from 0) with the largest gap as given.
 
-        The axis by what its gap has above the floor, over all validation logs. A simulation that broke off
-        is the largest gap there is.
+        The axis has the largest gap above the floor over all validation logs. A simulation that broke off
+        counts as the largest gap.
         """
         above = self.held_given**2 - self.held_floor**2
         axis = int(np.argmax(np.nan_to_num(above, nan=np.inf)))
@@ -133,24 +135,24 @@ class Session:
         return first + int(np.argmax(np.nan_to_num(gaps, nan=np.inf))), axis
 
     def counts(self, log: int) -> NDArray[np.bool_]:
-        """Return which samples of a log, by number, count in the gap (n,): not those that a filter invents."""
+        """Return which samples of a log (by number) count in the gap (n,): all but filter transients."""
         if log not in self._counts:
             self._counts[log] = self.view.counted(self.logs[log])[:, 0] > 0
         return self._counts[log]
 
     @property
     def filter_words(self) -> str:
-        """Which filter measured and simulated torque passed."""
+        """Name of the filter that measured and simulated torque passed."""
         return filter_words(self.view.compared, self.view.lowpass_hz)
 
     @property
     def bands(self) -> list[tuple[float, float]]:
-        """Frequency bands [Hz] of `Seen.bands`, those of a diagnosis."""
+        """Frequency bands [Hz] of `Seen.bands`, the same as in a diagnosis."""
         nyquist = 0.5 / self.logs[0].sample_time_s
         return list(pairwise([*(e for e in BAND_EDGES_HZ if e < nyquist), nyquist]))
 
     def measured(self, log: int) -> Array:
-        """Return the torque that a log, by number, is compared in (n, n_axes) [Nm]."""
+        """Return the measured torque with which a log (by number) is compared, (n, n_axes) [Nm]."""
         if log not in self._measured:
             self._measured[log] = self.view.measured(self.logs[log])
         return self._measured[log]
@@ -162,14 +164,14 @@ class Session:
         changed.with_effects({e.label: e for e in (*changed.effects, *own.values())}.values())
 
     def see(self, log: int, version: Version = AS_GIVEN) -> Seen:
-        """Return a simulator on one log, by number, the same object again while it is kept.
+        """Return a simulator on one log (by number); a cached result is the same object.
 
-        Raises InputError as `check`.
+        Raises InputError as `check` does.
         """
         return self._seen(log, version)
 
     def _simulate(self, log: int, version: Version) -> Seen:
-        # What the robot cannot have is said before anything runs.
+        # Effects that the robot cannot have must fail before any simulation.
         self.check(version)
         simulated, position = self.view.run(version.variant(), self.logs[log])
         measured = self.measured(log)
@@ -191,18 +193,18 @@ class Session:
 
     @cached_property
     def held_floor(self) -> Array:
-        """Gap per axis that noise alone makes over all validation logs (n_axes,) [1]."""
+        """Return the gap per axis that noise alone causes over all validation logs (n_axes,) [1]."""
         noise = self.view.noises(self._held, len(self.view.logs))
         return self._gap(self._held, noise, self._held_measured())
 
     @cached_property
     def held_given(self) -> Array:
-        """`held_gap` of the simulator as given (n_axes,) [1]."""
+        """Return `held_gap` of the simulator as given (n_axes,) [1]."""
         return self.held_gap()
 
     @cached_property
     def measured_gains(self) -> tuple[Array, Array] | None:
-        """Frequencies and gains from motor torques to motor angles that all logs together show, if they do."""
+        """Measured frequencies and gains from motor torques to motor angles, of all logs; None if unknown."""
         return measured_gains(self.logs)
 
     def _held_measured(self) -> list[Array]:

@@ -1,4 +1,4 @@
-"""What is chosen on the page: log, axis, causes and their values, pins. It outlives a reload."""
+"""The user's choices on the page: log, axis, causes and their values, pins. They survive a reload."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ PINS = ("A", "B")
 
 @dataclass
 class State:
-    """The choices of the one who looks; ``log`` and ``axis`` are numbers from 0.
+    """The user's choices; ``log`` and ``axis`` count from 0.
 
-    ``chosen``: causes at work, those that the robot's file states among them; ``refitted``: whether the
-    simulator has the parameters that the diagnosis re-fitted; ``pins``: versions kept to compare.
+    - ``chosen``: causes at work, including those of the robot file.
+    - ``refitted``: whether the simulator has the re-fitted parameters of the diagnosis.
+    - ``pins``: versions kept for comparison.
     """
 
     session: Session
@@ -32,21 +33,21 @@ class State:
     pins: dict[str, Version] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Begin with what the robot file states."""
+        """Start with the causes of the robot file."""
         if not self.chosen:
             self.chosen = tuple(e for e in self.session.robot.effects if e.acts)
         if self.said is not None:
             self.hear(self.said.document)
 
     def title(self) -> str:
-        """Return robot and verdict."""
+        """Return the title: robot and verdict."""
         robot = self.session.robot.name or self.session.name
         return f"{robot}: {'no verdict yet' if self.said is None else self.said.verdict}"
 
     def version(self) -> Version:
-        """Return the simulator as it is chosen."""
+        """Return the chosen version of the simulator."""
         labels = {e.label for e in self.chosen}
-        # Its own causes that were taken out stand at nothing.
+        # Own causes that the user removed are set to neutral.
         out = [
             at_place(e.name, e.place, {})
             for e in self.session.robot.effects
@@ -58,7 +59,7 @@ class State:
         return Version.of([*self.chosen, *out], values)
 
     def said_of(self, version: Version) -> str:
-        """Return a version in a line."""
+        """Return a version in one line."""
         parts = []
         for effect in version.effects:
             values = (f"{name} {value:.4g}" for name, value in (effect.parameters or {}).items())
@@ -67,22 +68,22 @@ class State:
         return "; ".join(filter(None, parts)) or "as given"
 
     def add(self, effect: Effect) -> None:
-        """Put a cause in, in place of one of its name and axis; raises InputError if it cannot be there."""
+        """Add a cause, replacing one of its name and axis; raises InputError if the robot cannot have it."""
         self.session.check(Version.of([effect]))
         self.chosen = with_effect(self.chosen, effect)
 
     def take_out(self, label: str) -> None:
-        """Take a cause out, by its label."""
+        """Remove a cause by its label."""
         self.chosen = tuple(e for e in self.chosen if e.label != label)
 
     def set_value(self, label: str, parameter: str, value: float) -> None:
-        """Give a parameter of a cause another value."""
+        """Set a parameter of a cause."""
         self.chosen = tuple(
             e.with_values({parameter: value}) if e.label == label else e for e in self.chosen
         )
 
     def hear(self, document: object, source: str = "verdict") -> None:
-        """Take what a verdict says; raises InputError for one that is not of this robot."""
+        """Take over a verdict; raises InputError for a verdict of another robot."""
         new = said(document, source)
         try:
             self.session.check(Version.of([c.effect for c in new.causes]))

@@ -1,4 +1,4 @@
-"""Tables and texts of the page as HTML; whatever comes from files is escaped here."""
+"""Tables and texts of the page as HTML; this module escapes everything that comes from files."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _UNKNOWN = "–"
 
 
 def name_of(effect: Effect) -> str:
-    """Return an effect and its place in words; both come from the table of effects."""
+    """Return an effect and its place in words from the table of effects."""
     return f"{title(effect.name)}, {place(effect.axis, effect.axes)}"
 
 
 def share(value: float | None) -> str:
-    """Return a gap in per cent."""
+    """Return a gap as a percentage."""
     return _UNKNOWN if value is None or math.isnan(value) else percent(value)
 
 
@@ -31,9 +31,10 @@ def table(
     *,
     unseen: bool = False,
 ) -> str:
-    """Return an HTML table with the names of its rows first; every cell is escaped.
+    """Return an HTML table with row names in the first column; every cell is escaped.
 
-    ``name``: its id; ``unseen``: whether the caption is for screen readers, where a heading says the same.
+    ``name``: its id. ``unseen``: whether only screen readers get the caption, because a heading says the
+    same.
     """
     top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
     body = "".join(
@@ -76,7 +77,7 @@ GAP = "The gap is the rms difference in per cent of the standard deviation of th
 
 
 def of_cause(cause: SaidCause) -> str:
-    """Return a cause that a diagnosis named, with its values and their 95 % intervals."""
+    """Return a named cause with its values and their 95 % intervals."""
     said = [] if cause.probability is None else [f"probability {probability(cause.probability)}"]
     for name, value in (cause.effect.parameters or {}).items():
         low, high = cause.intervals.get(name, (None, None))
@@ -86,7 +87,7 @@ def of_cause(cause: SaidCause) -> str:
 
 
 def of_verdict(said: Said, labels: Sequence[str]) -> str:
-    """Return verdict, headline and gaps of a diagnosis; ``labels``: what its axes are called."""
+    """Return verdict, headline and gaps of a diagnosis; ``labels``: names of its axes."""
     rows = [
         (label, *map(share, row))
         for label, *row in zip(labels, said.before, said.after, said.floor, strict=True)

@@ -1,4 +1,4 @@
-"""Models that do not hold: an answer of a fit, and an error only where one has to hold."""
+"""Models whose simulation diverges: a possible result of a fit, or an error."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ A = TypeVar("A")
 
 
 def must_hold(found: A | Diverged) -> A:
-    """Return what was found where nothing goes on without; raises InputError where the model does not hold."""
+    """Return ``found``, or raise InputError if the model diverges."""
     if isinstance(found, Diverged):
         raise InputError(str(found))
     return found

@@ -29,10 +29,10 @@ Array = NDArray[np.float64]
 class Parameter:
     """One number to fit.
 
-    ``robot`` names a robot parameter (``axis1.stiffness``; see
-    `robot_parameters`), or ``effect`` gives the position of an effect in the
-    list of effects and ``name`` its parameter. ``scale`` is the natural size
-    of a change; ``prior`` a mean and standard deviation; ``nuisance`` marks a
+    Without ``effect``, ``name`` is a robot parameter (``axis1.stiffness``; see `robot_parameters`).
+    Otherwise ``effect`` is the position of an effect in the list of effects, and ``name`` one of its
+    parameters. ``scale`` is the natural size of a change, ``prior`` a mean and a standard deviation,
+    all in the unit of the parameter. ``frozen`` keeps it at ``initial``. ``nuisance`` marks a
     parameter whose sensitivity is computed once and refreshed at the end.
     """
 
@@ -52,9 +52,9 @@ class Parameter:
 class Weighting:
     """Weight of residuals over frequency, one table per axis, and decimation.
 
-    ``frequency_hz`` (n_freq,), ``weight`` (n_axes, n_freq); linear in between,
-    constant outside; nothing above the Nyquist frequency after decimation
-    passes. A residual of standard deviation s weighted by 1/s counts one.
+    ``frequency_hz`` (n_freq,) [Hz] and ``weight`` (n_axes, n_freq) are linear in between and constant
+    outside. Frequencies above the Nyquist frequency after decimation have weight zero. A residual of
+    standard deviation s weighted by 1/s counts one.
     """
 
     frequency_hz: Array
@@ -63,13 +63,13 @@ class Weighting:
 
     @classmethod
     def flat(cls, n_axes: int) -> Weighting:
-        """No weighting."""
+        """Return a weighting of one at all frequencies."""
         return cls(np.zeros(1), np.ones((n_axes, 1)))
 
     def of(self, series: Array, sample_time_s: float) -> Array:
         """Return signals (n, n_axes) weighted and decimated, (n // decimation, n_axes).
 
-        As the core does it: continued by reflection, zero phase.
+        Like the core, it continues the signals by reflection and filters with zero phase.
         """
         kept = len(series) // self.decimation
         whole = series[: kept * self.decimation]
@@ -78,12 +78,12 @@ class Weighting:
         weight = [np.interp(frequency, self.frequency_hz, w) for w in self.weight]
         spectrum *= np.stack(weight, axis=1) / np.sqrt(self.decimation)
         if self.decimation > 1:
-            # Two frequencies meet at the new Nyquist frequency.
+            # Decimation folds two frequencies onto the new Nyquist frequency.
             spectrum[-1] = 0.0
         return np.asarray(np.fft.irfft(spectrum, 2 * kept, axis=0)[:kept])
 
     def core(self) -> list[tuple[list[float], list[float], int]]:
-        """Return the tables as the compiled core takes them."""
+        """Return the tables in the form of the compiled core."""
         f = self.frequency_hz.tolist()
         return [(f, w.tolist(), self.decimation) for w in self.weight]
 
@@ -92,10 +92,12 @@ class Weighting:
 class FitOptions:
     """Settings of a fit.
 
-    Stop after ``max_iterations`` accepted steps, when the loss falls by less
-    than ``loss_tolerance`` of itself, or when no parameter moves by
-    ``step_tolerance`` of its scale. ``loss`` with ``loss_scale`` in units of
-    the whitened residual. ``method`` as in `axisight.simulate`.
+    The fit stops after ``max_iterations`` accepted steps, when the loss falls by less than
+    ``loss_tolerance`` of itself, or when no parameter moves by ``step_tolerance`` of its scale.
+    ``loss_scale`` of a robust ``loss`` is in units of the whitened residual. ``nuisance_refreshes`` is
+    how often sensitivities of nuisance parameters are computed again, and ``block_s`` [s] the length
+    of the data blocks of the sandwich covariance. ``method``, ``substeps`` and ``tolerance`` are those
+    of `axisight.simulate`.
     """
 
     max_iterations: int = 50
@@ -111,7 +113,7 @@ class FitOptions:
 
     @property
     def integrator(self) -> Integrator:
-        """``method``, ``substeps`` and ``tolerance``; raises InputError as `Integrator`."""
+        """``method``, ``substeps`` and ``tolerance`` as an `Integrator`; raises its InputError."""
         return Integrator(self.method, self.tolerance, self.substeps)
 
 
@@ -120,11 +122,11 @@ class FitOptions:
 class Fitted:
     """Result of a fit.
 
-    ``status``: ``loss_converged``, ``step_converged``, ``exact`` (nothing is left),
-    ``max_iterations`` or ``stalled``; ``warnings`` say in words what to mind (status, parameters on a
-    bound, poor conditioning). ``values``, ``std`` and the matrices run over
-    ``names``, the free parameters; ``std`` is from the sandwich covariance of
-    data blocks and priors, which stays valid when the model is incomplete.
+    ``status`` is ``loss_converged``, ``step_converged``, ``exact`` (no residual is left),
+    ``max_iterations`` or ``stalled``. ``warnings`` say what to check: status, parameters on a bound,
+    poor conditioning. ``values``, ``std`` and the matrices run over ``names``, the free parameters,
+    in their units. ``std`` comes from the sandwich covariance of data blocks and priors, which stays
+    valid if the model is incomplete.
     """
 
     names: tuple[str, ...]
@@ -143,7 +145,7 @@ class Fitted:
     core: _core.FitResult = field(repr=False)
 
     def _repr_html_(self) -> str:
-        """Values with standard errors, for notebooks."""
+        """Return the values with standard errors, for notebooks."""
         return html.page(
             f"fit: {self.status} after {self.iterations} iterations",
             html.values(self.names, self.values, self.std),
@@ -165,7 +167,7 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Spec:
-    """A parameter as the compiled core reads it."""
+    """A parameter in the form of the compiled core."""
 
     robot: str | None
     effect: tuple[int, int] | None
@@ -193,8 +195,9 @@ def robot_parameter(
 ) -> Parameter:
     """Return a robot parameter at its nominal value, free or within a tolerance.
 
-    A ``relative_tolerance`` becomes the standard deviation of a prior, with
-    bounds at four of them; ``nuisance`` as in `Parameter`. Raises InputError for an unknown name.
+    ``relative_tolerance``, relative to the value, becomes the standard deviation of a prior, with
+    bounds at four standard deviations. ``nuisance`` is that of `Parameter`. Raises InputError for an
+    unknown name.
     """
     known = robot_parameters(robot)
     if name not in known:
@@ -222,7 +225,10 @@ def robot_parameter(
 
 
 def effect_parameter(effects: Sequence[Effect], index: int, name: str) -> Parameter:
-    """Return a parameter of ``effects[index]`` at its present value, within the table's bounds."""
+    """Return the parameter ``name`` of ``effects[index]``, at its present value and with its bounds.
+
+    Raises InputError for an unknown name.
+    """
     info = {p.name: p for p in effect_info(effects[index].name).parameters}
     if name not in info:
         raise InputError(
@@ -235,7 +241,7 @@ def effect_parameter(effects: Sequence[Effect], index: int, name: str) -> Parame
 
 
 def core_spec(parameter: Parameter, effects: Sequence[Effect]) -> Spec:
-    """Return a parameter as the compiled core reads it."""
+    """Return a parameter in the form of the compiled core."""
     place = None
     if parameter.effect is not None:
         names = [p.name for p in effect_info(effects[parameter.effect].name).parameters]
@@ -257,11 +263,11 @@ def core_spec(parameter: Parameter, effects: Sequence[Effect]) -> Spec:
 
 
 def _amplitude(effect: Effect, name: str) -> int | None:
-    """Return which parameter is the only size of an effect, of a shape of it."""
+    """Return the position of the effect's only amplitude if ``name`` is a shape, else None."""
     table = effect_info(effect.name).parameters
     sizes = [i for i, p in enumerate(table) if p.role == "amplitude"]
     shape = any(p.name == name and p.role == "shape" for p in table)
-    # One that is nothing at a limit, not at zero, is no factor.
+    # Only an amplitude that is neutral at zero is a factor of the effect.
     return sizes[0] if shape and len(sizes) == 1 and table[sizes[0]].neutral == 0 else None
 
 
@@ -274,13 +280,13 @@ def fit(
     weighting: Weighting | None = None,
     options: FitOptions | None = None,
 ) -> Fitted:
-    """Fit parameters to several logs at once by simulation error.
+    """Fit parameters to several logs together, and return values with standard errors.
 
-    The simulated commanded torque is compared with the logged one when the
-    logs have velocity references and the robot a controller; otherwise the
-    simulation is driven by the logged torque and positions are compared.
-    Effect parameters refer to positions in ``effects``. The robot's own effects
-    act too, but for those that one in ``effects`` replaces: same name, same axis.
+    If the robot has a velocity controller and all logs have velocity references, the fit compares
+    simulated and logged torque commands [Nm]. Otherwise the logged torque drives the simulation, and
+    the fit compares motor positions [rad]. ``weighting`` and ``options`` have defaults.
+    Effect parameters refer to positions in ``effects``. The robot's own effects act too; an effect in
+    ``effects`` replaces the robot's own one with the same name and axis.
     Raises InputError for misuse, and for a start that cannot be simulated; non-convergence is a status.
     """
     chosen = options or FitOptions()
@@ -305,14 +311,14 @@ def fit(
 
 
 def is_closed_loop(robot: Robot, logs: Sequence[Log]) -> bool:
-    """Whether a simulation can run as the logs did: a controller of speed, and references to all of them."""
+    """Return whether the robot has a velocity controller and all logs have velocity references."""
     return robot.told_speeds and all(log.velocity_ref_rad_s is not None for log in logs)
 
 
 def records(
     logs: Sequence[Log], *, closed: bool
 ) -> list[tuple[Array, Array, None, Array | None, int]]:
-    """Return (input, target, no certainty, start, lead) of logs, in closed loop or driven by torque."""
+    """Return (input, target, None, start, lead) of each log, in closed loop or driven by torque."""
     out = []
     for log in logs:
         reference = log.velocity_ref_rad_s
@@ -364,10 +370,10 @@ def _full_name(parameter: Parameter, effects: Sequence[Effect]) -> str:
     return f"{effects[parameter.effect].label}.{parameter.name}"
 
 
-# What to mind of a search that did not arrive, by status.
+# Advice for a search that did not converge, by status.
 STATUS_ADVICE = dict(_core.status_advice())
 
-# Beyond this, a parameter combination is known a thousand times worse than the best one.
+# Beyond this condition, one parameter combination is known a thousand times worse than the best.
 _POOR_CONDITION = 1e6
 
 

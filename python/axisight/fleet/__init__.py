@@ -1,4 +1,4 @@
-"""Many robots, many days: every case of a folder diagnosed, in one table and on one page."""
+"""Diagnosis of many robots over many days: all cases of a folder in one table and on one page."""
 
 from axisight.fleet.cases import FleetCase, fleet_cases
 from axisight.fleet.page import render_fleet

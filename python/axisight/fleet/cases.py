@@ -1,4 +1,4 @@
-"""Cases of a folder, and what a diagnosis of one depends on."""
+"""Cases of a folder, and a fingerprint of everything that a diagnosis depends on."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from axisight.errors import InputError
 class FleetCase:
     """One case (`axisight.case/1`) of a fleet.
 
-    ``name``: its folder below the fleet's, with slashes; ``machine``: the folder that is in, which
-    cases of one machine share (empty for the fleet's own). Names in order are the order in time.
+    ``name``: path of its folder below the fleet's, with slashes. ``machine``: the parent folder, which all
+    cases of one machine share; empty for the fleet's folder. The order of names is the order in time.
     """
 
     name: str
@@ -24,15 +24,15 @@ class FleetCase:
     path: Path
 
     def files(self) -> dict[str, bytes]:
-        """Return every file of the case by its name with slashes."""
+        """Return the content of every file of the case, by its path with slashes."""
         paths = sorted(_files_below(self.path))
         return {p.relative_to(self.path).as_posix(): p.read_bytes() for p in paths}
 
 
 def fleet_cases(folder: Path) -> list[FleetCase]:
-    """Return the cases anywhere below a folder, by name.
+    """Return the cases anywhere below a folder, sorted by name.
 
-    Folders that are links count as any. Raises InputError where there is none.
+    Links to folders are followed. Raises InputError for a folder without cases.
     """
     paths = sorted(p.parent for p in _files_below(folder) if p.name == "case.toml")
     if not paths:
@@ -45,7 +45,7 @@ def fleet_cases(folder: Path) -> list[FleetCase]:
 
 
 def _files_below(folder: Path) -> Iterator[Path]:
-    """Yield every file below a folder, through links too; one that leads back up is not followed."""
+    """Yield every file below a folder, through links too, except links that lead back up."""
     for place, inner, files in os.walk(folder, followlinks=True):
         here = Path(place)
         above = {here.resolve(), *here.resolve().parents}
@@ -54,7 +54,7 @@ def _files_below(folder: Path) -> Iterator[Path]:
 
 
 def fingerprint(files: dict[str, bytes], also: str) -> str:
-    """Return a digest of the files of a case and of what else its verdict depends on."""
+    """Return a digest of a case's files and of ``also``, everything else that its verdict depends on."""
     digest = hashlib.sha256(also.encode())
     for name, data in files.items():
         digest.update(f"{name}\0{len(data)}\0".encode())

@@ -1,4 +1,4 @@
-"""A fleet as one self-contained page: sorted and filtered in the browser, no network."""
+"""A fleet as one self-contained page: the browser sorts and filters it without a network."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _WIDTH, _HEIGHT, _EDGE = 140.0, 30.0, 3.0
 
 
 def render_fleet(name: str, table: pd.DataFrame, series: Sequence[Trend]) -> str:
-    """Return a fleet's table and the causes that change as one HTML page.
+    """Return a fleet's table and its changing causes as one HTML page.
 
     The same table gives the same text. All names and sentences are escaped.
     """
@@ -86,7 +86,7 @@ def _row(row: dict[Any, Any]) -> dict[str, Any]:
 
 
 def _key(value: float | None) -> str:
-    """Return what a cell is sorted by."""
+    """Return the sort key of a cell."""
     return "" if value is None else repr(float(value))
 
 
@@ -107,7 +107,7 @@ def _trend(trend: Trend, fleet: str) -> dict[str, str]:
 
 
 def _points(trend: Trend) -> str:
-    """Return the line of sizes from zero up, in pixels."""
+    """Return the polyline of sizes, with zero as its base, in pixels."""
     top = max(float(trend.sizes.max()), 1e-300)
     step = (_WIDTH - 2 * _EDGE) / (len(trend.sizes) - 1)
     low = _HEIGHT - _EDGE

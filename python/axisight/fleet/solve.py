@@ -1,4 +1,4 @@
-"""Diagnoses of a fleet: here or on a Dask cluster, resumable, the same bits wherever they ran."""
+"""Diagnoses of a fleet: on this machine or on a Dask cluster, resumable, with identical results."""
 
 from __future__ import annotations
 
@@ -35,17 +35,18 @@ def diagnose_fleet(
     patience_s: float = 60.0,
     progress: Progress = lambda _label, _done, _total: None,
 ) -> dict[str, dict[str, Any]]:
-    """Diagnose every case below ``folder``; return the verdicts by name, in their order.
+    """Diagnose every case below ``folder``; return the verdicts by name, in the order of the cases.
 
-    A verdict goes to ``verdicts`` / name + ``.json`` as soon as it is there, and stays where the
-    case, the settings and the version of this package are what they were; one that is damaged is made
-    again. A case that cannot be
-    diagnosed has ``error``, the reason, in place of a verdict. ``workers``: processes here;
-    ``scheduler``: address of a Dask scheduler whose workers do it instead, which are sent the
-    files. A verdict does not depend on where it was made: every diagnosis has one thread.
+    A verdict goes to ``verdicts`` / name + ``.json`` as soon as it is done. Later calls reuse it while the
+    case, the settings and the version of this package are the same; they replace a damaged one. A case that
+    fails has ``error``, the reason, in place of a verdict.
 
-    Raises InputError for a folder without cases, BackendError where a scheduler or all of its
-    workers are gone for ``patience_s`` seconds; what is finished stays.
+    ``workers``: processes on this machine. ``scheduler``: address of a Dask scheduler whose workers get the
+    files and diagnose instead. Every diagnosis uses one thread, so the verdict does not depend on where it
+    ran.
+
+    Raises InputError for a folder without cases, and BackendError if a scheduler or all of its workers are
+    gone for ``patience_s`` seconds. Finished verdicts stay.
     """
     one = replace(settings, threads=1)
     also = json.dumps([version("axisight"), asdict(one)], sort_keys=True, default=str)
@@ -78,7 +79,7 @@ def diagnose_fleet(
 
 
 def verdict_of(name: str, files: dict[str, bytes], settings: Settings) -> str:
-    """Return the verdict (JSON) of a case given by its files; ``error`` says why there is none."""
+    """Return the verdict (JSON) of a case from its files; its ``error`` says why a diagnosis failed."""
     with tempfile.TemporaryDirectory() as folder:
         for relative, data in files.items():
             path = Path(folder, relative)
@@ -90,7 +91,7 @@ def verdict_of(name: str, files: dict[str, bytes], settings: Settings) -> str:
             reason = str(error).replace(f"{folder}/", "")
             return json.dumps({"schema": "axisight.verdict/1", "name": name, "error": reason})
         out = found.to_verdict()
-    # How long it took is no part of what was found.
+    # The run time is not part of the result.
     out["provenance"].pop("seconds", None)
     return json.dumps(out, allow_nan=False)
 
@@ -100,7 +101,7 @@ def _path(verdicts: Path, case: FleetCase) -> Path:
 
 
 def _known(path: Path, wanted: str) -> dict[str, Any] | None:
-    """Return the verdict in a file if it is that of the fingerprint, as it was written."""
+    """Return the verdict in a file if it is undamaged and has the wanted fingerprint, else None."""
     try:
         found = parse_json(read_text(path))
     except (OSError, ValueError):
@@ -114,7 +115,7 @@ def _known(path: Path, wanted: str) -> dict[str, Any] | None:
 
 
 def _checksum(verdict: dict[str, Any]) -> str:
-    """Return the SHA-256 of what a verdict says, but for this line of it."""
+    """Return the SHA-256 of a verdict without its checksum field."""
     said = {name: value for name, value in verdict.items() if name != "sha256"}
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
@@ -122,7 +123,7 @@ def _checksum(verdict: dict[str, Any]) -> str:
 def _here(
     cases: Sequence[FleetCase], settings: Settings, workers: int
 ) -> Iterator[tuple[FleetCase, str]]:
-    """Yield every case with its verdict as it is done, by processes of this machine."""
+    """Yield every case with its verdict as it finishes, from processes of this machine."""
     work = partial(_of_path, settings=settings)
     for place, verdict in each_done(work, cases, workers):
         yield cases[place], verdict

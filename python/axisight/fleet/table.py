@@ -1,4 +1,4 @@
-"""Verdicts of a fleet as a table: a row for every cause, one for a case without."""
+"""Verdicts of a fleet as a table: one row per cause, one for a case without causes."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ COLUMNS = {
     "high": "Float64",
     "unit": "string",
 }
-"""Columns and their types. ``parameter``: the first of the cause, with its interval at 95 %."""
+"""Columns and their types. ``parameter`` is the first of the cause, with its 95 % interval."""
 
 
 def fleet_table(
     cases: Sequence[FleetCase], verdicts: Mapping[str, Mapping[str, Any]]
 ) -> pd.DataFrame:
-    """Return the verdicts by case name as a table with `COLUMNS`, in the order of the cases.
+    """Return the verdicts by case name as a table with the columns `COLUMNS`, in the order of the cases.
 
-    A case that could not be diagnosed has ``error`` for a verdict and the reason for a headline.
+    A failed case has the verdict ``error``, and the reason as its headline.
     """
     rows = [row for case in cases for row in _rows(case, verdicts[case.name])]
     table = pd.DataFrame(rows, columns=list(COLUMNS))

@@ -1,4 +1,4 @@
-"""Causes that grow: the size of a cause over the cases of one machine, in their order."""
+"""Causes that grow: the size of a cause over the cases of one machine, in order."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# With fewer cases no order of sizes is rare: all five rise by chance once in sixty.
+# With fewer cases chance alone gives a monotonic order too often: five rise by chance once in 60.
 _FEWEST = 5
-# Of all series together (Bonferroni).
+# Probability of a false alarm over all series (Bonferroni).
 _FALSE_ALARMS = 0.05
 
 
 @dataclass(frozen=True)
 class Trend:
-    """A cause of a machine over its cases: ``sizes`` (n_cases,) by case, zero where it is no cause.
+    """A cause of a machine over its cases: ``sizes`` (n_cases,), zero in cases without the cause.
 
-    ``axis`` from 1, None for the arm. ``per_case``: the median slope from one case to the next
-    (Theil, Sen), with its interval at 95 % from ``low`` to ``high``; ``p_value``: of Kendall's rank
-    correlation with time; ``changes``: whether that is small for so many series.
+    - ``axis``: from 1, None for the arm.
+    - ``per_case``: median slope per case (Theil-Sen), with its 95 % interval from ``low`` to ``high``.
+    - ``p_value``: of Kendall's rank correlation with time.
+    - ``changes``: whether ``p_value`` is small for the number of series.
     """
 
     machine: str
@@ -41,10 +42,10 @@ class Trend:
 
 
 def trends(table: pd.DataFrame) -> list[Trend]:
-    """Return the causes of a fleet's table over the cases of each machine, the surest first.
+    """Return the causes of a fleet's table over the cases of each machine, the most significant first.
 
-    Only of machines with five cases that have a verdict, and more. A size is the absolute value of
-    the cause's first parameter; the case names give the order in time.
+    Only machines with at least five cases that have a verdict count. A size is the absolute value of the
+    cause's first parameter. The order of case names is the order in time.
     """
     found = [t for _, own in table.groupby("machine", sort=True) for t in _of_machine(own)]
     level = _FALSE_ALARMS / max(len(found), 1)
@@ -82,7 +83,7 @@ def _trend(
         per_case=float(slope.slope),
         low=float(slope.low_slope),
         high=float(slope.high_slope),
-        # Sizes that are all the same have no rank.
+        # Equal sizes have no rank correlation.
         p_value=float(np.nan_to_num(rank.pvalue, nan=1.0)),
         changes=False,
     )

@@ -45,30 +45,30 @@ def fit_responses(
 ) -> FrequencyFit:
     """Fit parameters of the linearized robot to responses at several operating points.
 
-    Source: Wernholt (2004), (3.42) to (3.44). At every operating point the robot is
-    linearized where its elastic joints settle under gravity; the gradient is exact, the
-    dependence of that point on the parameters included.
+    Source: Wernholt (2004), (3.42) to (3.44). The robot is linearized at the equilibrium of its
+    elastic joints under gravity, at every operating point. The gradient is exact and includes the
+    dependence of the equilibrium on the parameters.
 
     robot
-        Its other parameters stay as they are.
+        The model; parameters that are not fitted keep their values.
     responses
-        :class:`MeasuredResponse`, or pairs of the angles of the driven joints [rad] and what
-        an estimator of `axisight.frf` returns (a Dataset, or a DataArray with units). Torque
-        to position, velocity or acceleration of the motors, told by the units.
+        :class:`MeasuredResponse`, or pairs of the angles of the driven joints [rad] and the response
+        from an estimator of `axisight.frf` (a Dataset, or a DataArray with units). The response is
+        from torque to position, velocity or acceleration of the motors, according to its units.
     parameters to fit
         Names (starting at the robot's values), a dict of names and starts, or
         :class:`axisight.Parameter` with bounds and priors. Names are those of
-        :func:`axisight.robot_parameters`. All but centres of mass are searched over their
-        logarithms, within a factor of 100 unless bounds are given.
+        :func:`axisight.robot_parameters`. The search is over logarithms, except for centres of mass,
+        and within a factor of 100 unless bounds are given.
     effects
-        Of those that leave the robot linear: payload, joint_stiffness, joint_damping,
-        motor_inertia. The robot's own act too, but for those of the same name and axis.
+        Effects that leave the robot linear: payload, joint_stiffness, joint_damping, motor_inertia.
+        They replace the robot's own effects of the same name and axis; its other effects act too.
     options
         See :class:`FrequencyFitOptions`.
 
     A weighted criterion needs the variance of every response. Residuals are model minus
-    measurement, whitened. Non-convergence and what data cannot tell are a status and
-    warnings; misuse raises InputError.
+    measurement, whitened. Non-convergence is a status, and warnings name combinations that the data
+    do not determine. Raises InputError for misuse.
     """
     chosen = options or FrequencyFitOptions()
     wanted = specs(robot, parameters)
@@ -157,7 +157,7 @@ BLOCKS_PER_PARAMETER = 5
 def _block_lines(
     options: FrequencyFitOptions, wanted: Sequence[Spec], data: Sequence[MeasuredResponse]
 ) -> int:
-    """Return the block length wanted, or what leaves enough blocks."""
+    """Return the chosen block length, or a shorter one that leaves enough blocks."""
     lines = sum(len(one.frequency_hz) for one in data)
     blocks = BLOCKS_PER_PARAMETER * sum(not spec.frozen for spec in wanted)
     return max(1, min(options.block_lines, lines // blocks))
@@ -168,7 +168,7 @@ def _from_starts(
     options: FrequencyFitOptions,
     search: Callable[[Sequence[Spec]], _core.FrequencyFitResult],
 ) -> list[_core.FrequencyFitResult]:
-    """Search from all starting points; best first. A start where the model fails is passed."""
+    """Return the searches from all starting points, best first, without starts where the model fails."""
     found = [search(wanted)]
     ranges = [_range(spec, options.start_spread) for spec in wanted]
     for number in range(1, options.starts):
@@ -177,13 +177,13 @@ def _from_starts(
         try:
             found.append(search(start))
         except InputError:
-            # The first start has shown that the data is sound: the arm does not settle here.
+            # The first start worked, so the data are valid: the arm has no equilibrium at this start.
             continue
     return sorted(found, key=lambda r: r.loss)
 
 
 def _range(spec: Spec, spread: float) -> StartRange | None:
-    """Return where starts of a parameter are drawn: about its initial value, None if frozen."""
+    """Return the range of random starts, about the initial value; None for a frozen parameter."""
     if spec.frozen:
         return None
     bounds = (spec.lower, spec.upper)

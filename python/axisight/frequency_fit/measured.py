@@ -1,4 +1,4 @@
-"""Measured responses with their operating point, and what the model says in their place."""
+"""Measured responses with their operating points, and responses of the model."""
 
 from __future__ import annotations
 
@@ -52,9 +52,11 @@ class MeasuredResponse:
         (n_freq, n_axes^2, n_axes^2) with the elements in the order output, input (row by
         row), or (n_freq, n_inputs, n_outputs, n_outputs) of the outputs for every input.
     degrees_of_freedom
-        Complex, of the variance; ``None`` if it is known exactly.
+        Complex degrees of freedom of the variance; ``None`` if the variance is known exactly.
     dropped_lines
-        Lines an estimator gave up (NaN and flagged), left out.
+        Number of lines left out because the estimator flagged them as NaN.
+
+    Raises InputError for other shapes, values that are not finite, and a variance with a covariance.
     """
 
     joint_angle_rad: tuple[float, ...]
@@ -98,11 +100,11 @@ class MeasuredResponse:
     ) -> MeasuredResponse:
         """Return the response in a Dataset of `axisight.frf`, or in a DataArray.
 
-        ``joint_angle_rad`` as the attribute. The unit of ``data`` says what is measured, rad/Nm,
-        rad/s/Nm or rad/s^2/Nm, or without one its attribute ``quantity``. Of a Dataset flagged
-        lines without numbers are left out and counted; its ``variance`` is used unless a
-        ``covariance`` is given (over the lines of the data). Raises InputError for other units,
-        dimensions, and NaN elsewhere.
+        ``joint_angle_rad`` is that of the class. The unit of ``data`` (rad/Nm, rad/s/Nm or
+        rad/s^2/Nm) or else its attribute ``quantity`` says what is measured. Flagged NaN lines of a
+        Dataset are left out and counted. Its ``variance`` is used unless ``covariance``, over all
+        lines of the data, is given. Raises InputError for other units or dimensions, and for NaN at
+        lines without a flag.
         """
         array = data["response"] if isinstance(data, xr.Dataset) and "response" in data else data
         if not isinstance(array, xr.DataArray) or set(array.dims) != set(DIMS):
@@ -142,20 +144,21 @@ class MeasuredResponse:
 
     @property
     def elements_weighed_together(self) -> int:
-        """How many elements of a line a weight matrix holds: 1 by variances."""
+        """Number of elements that one weight matrix couples: 1 for weights from variances."""
         if self.covariance is None:
             return 1
         m = int(self.response.shape[1])
         blocks = self.covariance.reshape(-1, m, m, m, m)
         apart = np.arange(m)[:, None] != np.arange(m)
-        # Elements (output, input): of different inputs, or of different outputs only.
+        # Without covariance between inputs, a weight matrix couples the outputs of one input only.
         return m * m if blocks.transpose(0, 1, 3, 2, 4)[:, :, :, apart].any() else m
 
     def pooled(self, neighbours: int | None, model: Complex | None) -> Real | None:
-        """Return variances to weigh by from neighbouring lines; None to weigh by each line's own.
+        """Return variances pooled from neighbouring lines, or None if each line's own sets its weight.
 
-        Shaped as ``variance``; ``neighbours`` as `FrequencyFitOptions` has it, ``model`` the
-        response whose magnitude counts, None the measured one. See `pooled_variance`.
+        The result has the shape of ``variance``. ``neighbours`` is that of `FrequencyFitOptions`.
+        ``model`` is the response that gives the magnitude, None for the measured one. See
+        `pooled_variance`.
         """
         freedom = self.degrees_of_freedom
         if freedom is None or self.variance is None:
@@ -170,10 +173,10 @@ class MeasuredResponse:
         return out
 
     def core(self, reference: Complex | None = None, weighing: Real | None = None) -> PoseTuple:
-        """Return the arrays as the compiled core takes them.
+        """Return the arrays in the form of the compiled core.
 
-        ``reference`` is what logarithmic weights are relative to, ``weighing`` the variance to
-        weigh by if not the own, shaped as ``response``.
+        Logarithmic weights are relative to the magnitude of ``reference``. ``weighing``, shaped as
+        ``response``, is the variance for the weights, None for each line's own.
         """
         variance = None if self.variance is None else np.ascontiguousarray(self.variance.ravel())
         covariance = None if self.covariance is None else self.covariance.ravel()
@@ -190,7 +193,7 @@ class MeasuredResponse:
 
 
 def measured(data: object, robot: Robot, sampling: Sampling) -> MeasuredResponse:
-    """Return a measured response from what the user gave: one, or a pair (angles, data)."""
+    """Return a MeasuredResponse from one, or from a pair (angles, data); raises InputError for others."""
     if isinstance(data, tuple | list) and len(data) == 2:
         angles, response = data
         found = MeasuredResponse.of(angles, response)
@@ -233,18 +236,18 @@ def model_response(
     frequency_hz
         Lines [Hz], (n_freq,).
     joint_angle_rad
-        Driven joints; None for the operating point of the robot.
+        Angles of the driven joints [rad], (n_axes,); None for the operating point of the robot.
     quantity
         ``position`` [rad/Nm], ``velocity`` [rad/s/Nm] or ``acceleration`` [rad/s^2/Nm].
     sampling
-        ``zero_order_hold`` is ``G(e^{i w T})``, what a sampled loop shows, times ``(i w)^p``
+        ``zero_order_hold`` is the response ``G(e^{i w T})`` of a sampled loop, times ``(i w)^p``
         for the p-th derivative; ``continuous`` is ``G(i w)``.
     effects
-        Of those that leave the robot linear: payload, joint_stiffness, joint_damping,
-        motor_inertia.
+        Effects that leave the robot linear: payload, joint_stiffness, joint_damping, motor_inertia.
 
-    Dims (frequency_hz, output, input). Equal to :meth:`axisight.Robot.zoh_response` without
-    effects, but by poles and residues and thus faster. Raises InputError for other effects.
+    The result has dims (frequency_hz, output, input). Without effects it equals
+    :meth:`axisight.Robot.zoh_response`, but is faster because it uses poles and residues. Raises
+    InputError for other effects.
     """
     f = _real("frequency_hz", frequency_hz, 1)
     check_sampling(sampling)
@@ -322,7 +325,7 @@ def _covariance(value: ArrayLike, shape: tuple[int, ...]) -> Complex:
     array = _complex("covariance", value)
     n, m, _ = shape
     if array.shape == (n, m, m, m):
-        # Elements (output, input): inputs are independent of each other.
+        # Different inputs have no covariance.
         full = np.zeros((n, m, m, m, m), np.complex128)
         for column in range(m):
             full[:, :, column, :, column] = array[:, column]

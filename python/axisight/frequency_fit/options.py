@@ -31,37 +31,41 @@ class FrequencyFitOptions:
     """Settings of :func:`fit_responses`.
 
     criterion
-        ``least_squares`` compares G, ``log_least_squares`` the logarithm of its magnitude and
-        its phase, (3.44); with ``weighted_`` each by its variance or covariance, (3.42), (3.43).
+        ``least_squares`` compares G; ``log_least_squares`` compares the logarithm of its magnitude
+        and its phase, (3.44). The prefix ``weighted_`` weights residuals by variance or covariance,
+        (3.42), (3.43).
     sampling
         ``zero_order_hold`` compares with ``G(e^{i w T})``, ``continuous`` with ``G(i w)``.
     loss, loss_scale
         ``squared``, ``huber`` or ``soft_l1`` of the magnitude of a whitened complex residual
-        (mean square 2): the robust ones hold back lines, at resonances say, that the model
-        misses by more than ``loss_scale``.
+        (mean square 2). The robust losses limit the influence of lines that the model misses by more
+        than ``loss_scale``, for example at resonances.
     reweightings
-        How often a weighted fit whose weights need it is repeated with the magnitude of the
-        fitted response in them: logarithmic, or weighed by neighbouring lines. With the
-        measured one (first pass) errors that enlarge G count more: a bias of the order of the
-        relative variance.
+        How often a fit is repeated with weights from the magnitude of the fitted response. This
+        applies to weighted fits that are logarithmic or use ``neighbours``. Their first pass uses the
+        measured magnitude, which favours errors that enlarge G: a bias of the order of the relative
+        variance.
     neighbours
-        How many neighbouring lines, half of them on either side, say by which variance a line
-        is weighed: an even number from 4. ``None``: none where the variance is known (no
-        ``degrees_of_freedom``) or rests on 30, else as many as make 30 together. 0: each line
-        by its own; then the covariance is enlarged by what such weights cost.
+        Number of neighbouring lines, half of them on either side, whose variances are pooled for the
+        weight of a line: an even number from 4. ``None``: no pooling if the variance is known (no
+        ``degrees_of_freedom``) or has at least 30 degrees of freedom; otherwise enough lines for 30
+        together. 0: each line by its own variance; the covariance is then enlarged by the cost of
+        such weights.
     uncertainty
-        ``response`` takes standard deviations from the variance of the response, ``sandwich``
-        from the scatter of the residuals over blocks of ``block_lines`` lines (fewer where that
-        would leave less than five blocks a parameter), ``auto`` the first, and the second where
-        the first does not hold: residuals larger than the variance explains, residuals of
-        neighbouring lines that resemble each other, a robust loss, or lines weighed by their own
-        variance of few realizations.
+        ``response`` takes standard deviations from the variance of the response. ``sandwich`` takes
+        them from the scatter of the residuals over blocks of ``block_lines`` lines, or of fewer lines
+        if that leaves less than five blocks per parameter. ``auto`` takes the first, or the second if
+        the residuals are larger than the variance explains, residuals at neighbouring lines are
+        correlated, the loss is robust, or lines are weighted by their own variance from few
+        realizations.
     starts, start_spread, seed
-        Searches from ``starts`` starting points; the first as given, the others with factors
-        up to ``1 + start_spread`` up or down, a function of (seed, number of the start).
+        Number of starting points, and their scatter. The first is as given; the others scale it up
+        or down by at most ``1 + start_spread``, as a function of (seed, number of the start).
     max_iterations, gain_tolerance, step_tolerance
         A search stops when a step promises to lower the loss by less than the share
-        ``gain_tolerance`` or no parameter moves by ``step_tolerance`` (relative).
+        ``gain_tolerance``, or when no parameter moves by ``step_tolerance`` (relative).
+
+    Raises InputError naming the field.
     """
 
     criterion: Criterion = "weighted_log_least_squares"
@@ -80,7 +84,7 @@ class FrequencyFitOptions:
     step_tolerance: float = 1e-10
 
     def __post_init__(self) -> None:
-        """Check."""
+        """Check all fields."""
         one_of("criterion", self.criterion, CRITERIA)
         check_sampling(self.sampling)
         if self.loss not in ("squared", "huber", "soft_l1"):
@@ -112,18 +116,18 @@ class FrequencyFitOptions:
 
     @property
     def weighted(self) -> bool:
-        """Whether residuals are weighed by the uncertainty of the response."""
+        """Whether the criterion weights residuals by the uncertainty of the response."""
         return self.criterion.startswith("weighted")
 
     @property
     def logarithmic(self) -> bool:
-        """Whether logarithms are compared."""
+        """Whether the criterion compares logarithms."""
         return "log" in self.criterion
 
 
 @dataclass(frozen=True)
 class CoreOptions:
-    """The settings as the compiled core reads them."""
+    """The settings in the form of the compiled core."""
 
     sampled: bool
     logarithmic: bool
@@ -137,7 +141,7 @@ class CoreOptions:
 
 
 def core_options(options: FrequencyFitOptions) -> CoreOptions:
-    """Return the settings as the compiled core reads them."""
+    """Return the settings in the form of the compiled core."""
     return CoreOptions(
         options.sampling == "zero_order_hold",
         options.logarithmic,

@@ -1,4 +1,4 @@
-"""Parameters of a frequency-domain fit as the compiled core reads them."""
+"""Parameters of a frequency-domain fit in the form of the compiled core."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from axisight.fitting import Parameter, robot_parameters
 from axisight.robot import Robot
 
 RANGE = 100.0
-"""Bounds of a parameter given by its start alone: this factor down and up."""
+"""Bounds of a parameter without given bounds: its start divided and multiplied by this factor."""
 
 
 @dataclass(frozen=True)
 class Spec:
-    """A parameter as the compiled core reads it."""
+    """A parameter in the form of the compiled core."""
 
     name: str
     initial: float
@@ -30,7 +30,7 @@ class Spec:
 
 
 def specs(robot: Robot, parameters: Sequence[str | Parameter] | Mapping[str, float]) -> list[Spec]:
-    """Return what to fit; a name starts at the value of the robot."""
+    """Return the parameters to fit; a bare name starts at the robot's value."""
     known = robot_parameters(robot)
     items: Sequence[str | Parameter | tuple[str, float]]
     if isinstance(parameters, str):
@@ -109,5 +109,5 @@ def _from_parameter(item: Parameter, known: Mapping[str, float]) -> Spec:
 
 
 def is_positive(name: str) -> bool:
-    """Whether a parameter has a sign by nature; centres of mass have not."""
+    """Return whether a parameter is positive by nature; all are, except centres of mass."""
     return not name.rsplit(".", 1)[-1].startswith("com_")

@@ -1,4 +1,4 @@
-"""What planned responses will tell of parameters."""
+"""Information of planned responses on the parameters."""
 
 from __future__ import annotations
 
@@ -40,26 +40,27 @@ def planned_information(
     name: str = "",
     advice: str = "",
 ) -> Information:
-    """Return what responses at some operating points would tell of parameters.
+    """Return the information that responses at some operating points would have on the parameters.
 
-    `axisight.identifiability.identifiability` puts it in words, `compare_experiments` and
-    `recommend_experiments` compare it with others. Scales are the parameters themselves, of
-    centres of mass one metre.
+    `axisight.identifiability.identifiability` assesses it; `compare_experiments` and
+    `recommend_experiments` compare it with other experiments. The scale of a parameter is its own
+    value, or one metre for a centre of mass.
 
     robot, parameters, effects, sampling
-        As for :func:`fit_responses`; the model is taken at the starts of the parameters.
+        As for :func:`fit_responses`; the model uses the starts of the parameters.
     operating_points_rad
-        Driven joints [rad], (n_points, n_axes).
+        Angles of the driven joints [rad], (n_points, n_axes).
     frequency_hz
         Lines [Hz], (n_freq,).
     relative_std
-        Standard deviation expected of the response relative to its magnitude: a number or an
+        Expected standard deviation of the response relative to its magnitude: a number or an
         array that broadcasts to (n_points, n_freq, n_outputs, n_inputs), for example from
         :func:`axisight.frf.predict_errors`.
     quantity
-        What the responses will be of; without influence while errors are relative.
+        Output of the responses: ``position``, ``velocity`` or ``acceleration``. It changes nothing
+        for relative errors.
     name, advice
-        Of the experiment, as in `axisight.identifiability.information`.
+        Name of the experiment and advice, as in `axisight.identifiability.information`.
 
     Raises InputError for misuse.
     """
@@ -85,9 +86,9 @@ def of_search(
     name: str = "",
     advice: str = "",
 ) -> Information:
-    """Return the information with ``matrix`` per searched number of the free parameters.
+    """Return the information of the free parameters; ``matrix`` is that of the searched numbers.
 
-    ``values`` of them, by default the starts.
+    ``values`` are those of the free parameters, by default their starts.
     """
     free = [spec for spec in chosen if not spec.frozen]
     at = [spec.initial for spec in free] if values is None else values

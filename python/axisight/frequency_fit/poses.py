@@ -1,4 +1,4 @@
-"""Operating points to measure at, chosen from candidates before any experiment."""
+"""Choice of operating points to measure at, before any experiment."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ Real = NDArray[np.float64]
 @summarized
 @dataclass(frozen=True)
 class PoseChoice:
-    """Operating points chosen for the most information.
+    """Operating points with the most information.
 
     chosen
-        Positions among the candidates, ascending; ``operating_points_rad`` are the points.
+        Indices of the candidates, ascending; ``operating_points_rad`` [rad] are the points.
     log_det
-        Of the information of the choice (natural logarithm).
+        Natural logarithm of the determinant of the information of the choice.
     efficiency
-        D-efficiency: ``exp((log_det - bound) / n_parameters)``, at most 1. The bound is that of
-        the relaxed problem, so that no choice of as many points can do better by more than
-        ``1 / efficiency`` in the mean standard deviation squared.
+        D-efficiency: ``exp((log_det - bound) / n_parameters)``, at most 1. The bound comes from the
+        relaxed problem. No other choice of as many points lowers the mean variance by more than the
+        factor ``1 / efficiency``.
     weights, sensitivity
-        Of the relaxed problem, per candidate: shares, and ``trace(M^-1 M_i)``.
+        Of every candidate in the relaxed problem: its share, and ``trace(M^-1 M_i)``.
     gap
         Certificate of the relaxed problem: its ``log det`` is within this of the optimum.
     identifiability
-        What responses at the chosen points will tell.
+        Identifiability of the parameters from responses at the chosen points.
     """
 
     chosen: tuple[int, ...]
@@ -84,33 +84,34 @@ def choose_poses(
     effects: Sequence[Effect] = (),
     gap_tolerance: float = 1e-6,
 ) -> PoseChoice:
-    """Choose operating points that tell the most of the parameters, from a nominal model.
+    """Return the candidates with the most information on the parameters, from a nominal model.
 
-    Maximizes ``log det`` of the information (D-optimal): the volume of the confidence
-    ellipsoid of all parameters becomes smallest, whatever their units. Source: Wernholt and
+    The choice maximizes ``log det`` of the information (D-optimal). That minimizes the volume of the
+    confidence ellipsoid of all parameters, in any units. Source: Wernholt and
     Löfberg (2007), Experiment design for identification of nonlinear gray-box models with
     application to industrial robots, CDC; Wernholt and Moberg (2011), Automatica.
 
     robot, parameters, effects, sampling
-        As for :func:`fit_responses`; starts and priors of the parameters are what is assumed.
+        As for :func:`fit_responses`; the choice uses the starts and priors of the parameters.
     candidates_rad
-        Driven joints [rad], (n_candidates, n_axes).
+        Angles of the driven joints [rad], (n_candidates, n_axes).
     frequency_hz
-        Lines [Hz] to be measured.
+        Lines [Hz] to be measured, (n_freq,).
     n_poses
-        Points to choose; ``repeats`` allows the same one several times.
+        Number of points to choose; ``repeats`` allows the same point several times.
     relative_std
-        Standard deviation expected of the responses relative to their magnitude, a number or
+        Expected standard deviation of the responses relative to their magnitude, a number or
         an array that broadcasts to (n_candidates, n_freq, n_outputs, n_inputs).
     measured_information
-        Information there is already, (n_parameters, n_parameters), for example
-        ``fit.information``; priors of the parameters are added.
+        Information of earlier measurements, (n_parameters, n_parameters), for example
+        ``fit.information``; the choice adds priors of the parameters.
     quantity
-        What the responses will be of.
+        Output of the responses: ``position``, ``velocity`` or ``acceleration``.
     gap_tolerance
-        To which the relaxed problem is solved, in ``log det``.
+        Tolerance of ``log det`` in the relaxed problem.
 
-    Raises InputError where all candidates together leave a combination unknown, naming it.
+    Raises InputError for misuse, and if all candidates together do not determine a combination of
+    parameters, which it names.
     """
     chosen = specs(robot, parameters)
     free = [spec for spec in chosen if not spec.frozen]

@@ -34,35 +34,33 @@ class FrequencyFit:
         Standard deviations in the same units, and 95 % intervals (n_parameters, 2); an
         interval of a positive parameter is symmetric in its logarithm.
     std_response, std_sandwich
-        Standard deviations by the uncertainty of the response (NaN if there was none and no
-        residual is left) and by the scatter of the residuals over blocks of lines, which
-        stays valid when the model is incomplete; ``std_from`` says which one ``std`` is.
+        Standard deviations from the uncertainty of the response (NaN without one and without
+        residuals), and from the scatter of the residuals over blocks of lines. The second stays valid
+        if the model is incomplete. ``std_from`` says which of them ``std`` is.
     covariance, correlation
-        (n_parameters, n_parameters), of the kind ``std_from`` says.
+        (n_parameters, n_parameters), from the source that ``std_from`` names.
     status
-        ``loss_converged``, ``step_converged``, ``exact`` (nothing is left), ``max_iterations`` or
+        ``loss_converged``, ``step_converged``, ``exact`` (no residual is left), ``max_iterations`` or
         ``stalled``.
     misfit
-        Mean square of a whitened residual, degrees of freedom counted: 1 if model and
+        Mean square of a whitened residual, corrected for degrees of freedom: 1 if model and
         uncertainty are right.
     loss, initial_loss, n_residuals
-        At the end and at the start; real and imaginary part of a residual count as two.
+        Loss at the end and at the start, and the number of residuals; real and imaginary part count
+        as two.
     iterations, evaluations
-        Of all passes from the best start.
+        Totals over all passes from the best start.
     at_bound
         Names of parameters on a bound.
     identifiability, information
-        Of the data that was used, with combinations that it does not determine; and its
-        information (n_parameters, n_parameters), per logarithm, of centres of mass per metre.
-
-    Warnings
-    --------
-        What to mind, in words.
+        Identifiability from the data used, with combinations that they do not determine; and their
+        information (n_parameters, n_parameters), per logarithm, or per metre for centres of mass.
     starts
         Loss, status and iterations of the search from every starting point, best first.
     robot
         The robot with the fitted values.
 
+    ``warnings`` say in words what to check.
     """
 
     names: tuple[str, ...]
@@ -90,7 +88,7 @@ class FrequencyFit:
     core: _core.FrequencyFitResult = field(repr=False)
 
     def _repr_html_(self) -> str:
-        """Values with standard errors and 95 % intervals, for notebooks."""
+        """Return the values with standard errors and 95 % intervals, for notebooks."""
         columns = (self.values, self.std, self.interval[:, 0], self.interval[:, 1])
         return html.page(
             f"fit to frequency responses: {self.status} after {self.iterations} iterations, "
@@ -143,7 +141,7 @@ class FrequencyFit:
 @summarized
 @dataclass(frozen=True)
 class Covariances:
-    """Of the searched numbers, by the response's uncertainty and by blocks of residuals."""
+    """Covariances of the searched numbers: from the response's uncertainty, and from blocks of residuals."""
 
     response: Real
     sandwich: Real
@@ -151,7 +149,7 @@ class Covariances:
 
 
 def covariances(result: _core.FrequencyFitResult, prior: Real, blocks: int) -> Covariances:
-    """Return covariances from the normal equations; infinite where these are singular.
+    """Return covariances from the normal equations, infinite if these are singular.
 
     ``prior`` is the information of the priors, (n_parameters,); ``blocks`` is the number of
     blocks of the sandwich, which loses a degree of freedom for every parameter.
@@ -188,7 +186,7 @@ def warn(
     dropped: int,
     sandwich: bool,
 ) -> tuple[str, ...]:
-    """Return what to mind; ``doubt`` is what speaks against the variance of the responses."""
+    """Return the warnings of a fit; ``doubt`` tells whether the variance of the responses holds."""
     out = []
     if result.status in STATUS_ADVICE:
         remedy = ": start closer, or take several starts" if result.status == "stalled" else ""

@@ -20,27 +20,26 @@ from axisight.robot_file.values import noted, values_of
 def identified_responses(
     fit: FrequencyFit, provenance: Provenance, *, effects: Sequence[Effect] = ()
 ) -> Identified:
-    """Return what :func:`fit_responses` found, for `axisight.robot_file.write_identified`.
+    """Return the result of :func:`fit_responses` for `axisight.robot_file.write_identified`.
 
-    Names, units and covariance are those of the fit already (linear units, also where the
-    search was over logarithms). Parameters that were frozen at other values than those in the
-    robot's file are written with them, standard error zero, and named in the notes. So are the
-    warnings of the fit and a search that did not converge.
+    Names, linear units and covariance are those of the fit. A parameter frozen at another value than
+    that of the robot's file is written at its frozen value, with standard error zero. The notes name
+    such parameters, the warnings of the fit, and a search that did not converge.
 
     fit
-        Written over the robot that it was made from, it gives ``fit.robot``.
+        The fit. Writing it over the file of its robot gives ``fit.robot``.
     provenance
-        Where the values come from.
+        Source of the values.
     effects
-        Those given to :func:`fit_responses`; the robot's own are kept without.
+        The effects given to :func:`fit_responses`. Without them the robot's own effects stay.
 
-    A covariance that is not finite (data that do not tell some parameters apart) leaves standard
-    errors unknown. Raises InputError for another type, and for a robot whose inertias are not
-    those of its file: they were changed by a frozen ``inertia_scale``, or before the fit.
+    Standard errors are unknown if the covariance is not finite, that is, if the data do not tell some
+    parameters apart. Raises InputError for another type, and for a robot whose inertias differ from
+    those of its file, because of a frozen ``inertia_scale`` or a change before the fit.
     """
     if not isinstance(fit, FrequencyFit):
         raise InputError(f"fit: expected a FrequencyFit, got {type(fit).__name__}")
-    # A robot with changed parameters keeps the text it came from.
+    # A robot with changed parameters keeps the text of its file.
     source = Robot.from_toml(fit.robot.toml)
     before, after = robot_parameters(source), robot_parameters(fit.robot)
     held = {n: v for n, v in after.items() if n not in fit.names and v != before[n]}

@@ -16,22 +16,23 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 RELATED = 3.0
-"""Standard deviations; by chance 0.3 % of fits lie beyond."""
+"""Threshold in standard deviations; by chance 0.3 % of fits exceed it."""
 CHANCE = 1e-3
-"""Probability that the line furthest off in a fit is called an outlier by chance."""
+"""Probability of calling the line with the largest residual an outlier by chance."""
 
 
 @summarized
 @dataclass(frozen=True)
 class Trust:
-    """What speaks against standard deviations from the variance of the responses.
+    """Reasons to doubt standard deviations that come from the variance of the responses.
 
-    ``excess``: mean square of the whitened residuals over what the variance explains, None if
-    unknown. ``related``: correlation of residuals at neighbouring lines, in standard deviations
-    of chance. ``outlier``: the line that is furthest off, in words, if it is too far for chance,
-    else None. ``own_weights``: fewest complex degrees of freedom of a variance that weighs its
-    own line, None where all are known, pooled or many. ``inflation``: by which weights from
-    their own variance make the covariance of the parameters larger than they claim.
+    - ``excess``: mean square of the whitened residuals, relative to the mean square that the variance
+      explains; None if unknown.
+    - ``related``: correlation of residuals at neighbouring lines, in standard deviations of chance.
+    - ``outlier``: text on the line with the largest residual if chance does not explain it, else None.
+    - ``own_weights``: fewest complex degrees of freedom of a variance that weights its own line; None
+      if all variances are known, pooled or have many degrees of freedom.
+    - ``inflation``: factor by which such weights enlarge the covariance of the parameters.
     """
 
     excess: float | None
@@ -42,11 +43,11 @@ class Trust:
 
     @property
     def holds(self) -> bool:
-        """Whether nothing does."""
+        """Whether there is no reason to doubt."""
         return not self.reasons()
 
     def reasons(self) -> list[str]:
-        """Return in words what does."""
+        """Return the reasons to doubt as text."""
         out = []
         if self.excess is not None and self.excess > MISFIT_EXPLAINED:
             out.append(
@@ -74,10 +75,11 @@ def trust(
     *,
     weighted: bool,
 ) -> Trust:
-    """Compare residuals with the variance of the responses.
+    """Return a comparison of the residuals with the variance of the responses.
 
-    ``weighing`` is what `MeasuredResponse.pooled` returned, ``residual`` (n, 2) the whitened
-    residuals of all responses, ``misfit`` their mean square, degrees of freedom counted.
+    ``weighing`` is the result of `MeasuredResponse.pooled` per response. ``residual`` (n, 2) are the
+    whitened residuals of all responses, and ``misfit`` is their mean square, corrected for degrees
+    of freedom.
     """
     known = all(one.variance is not None or one.covariance is not None for one in data)
     few = [
@@ -101,7 +103,7 @@ def _inflation(data: Sequence[MeasuredResponse], weighing: Sequence[Real | None]
         for one, weights in zip(data, weighing, strict=True)
     ]
     found = float(np.average(factors, weights=[one.response.size for one in data]))
-    # Without bound the sandwich is taken, or the user insists.
+    # An unbounded inflation is not used: the fit takes the sandwich unless the user chose otherwise.
     return found if np.isfinite(found) else 1.0
 
 
@@ -110,10 +112,10 @@ def _own(one: MeasuredResponse) -> OwnWeights:
 
 
 def _outlier(data: Sequence[MeasuredResponse], residual: Complex, misfit: float) -> str | None:
-    """Return in words the residual furthest off, if normal ones of this mean square are not so far.
+    """Return text on the largest residual if it is too large for a normal one of this mean square.
 
-    The squared magnitude over its mean is exponential: n of them exceed ln(n / p) with
-    probability p. The mean is that of all, so a model that misses everywhere has no outlier.
+    The squared magnitude over its mean is exponential, so the largest of n exceeds ln(n / p) with
+    probability p. The mean is over all residuals, so a model that is wrong everywhere has no outlier.
     """
     size = np.abs(residual)
     place = int(np.argmax(size))
@@ -134,10 +136,10 @@ def _outlier(data: Sequence[MeasuredResponse], residual: Complex, misfit: float)
 
 
 def _explained(data: Sequence[MeasuredResponse], weighing: Sequence[Real | None]) -> float:
-    """Mean square of whitened residuals that the variance explains.
+    """Return the mean square of whitened residuals that the variance explains.
 
-    Weighed by other lines, that is the mean ratio of both variances; by the own one, see
-    `OwnWeights`.
+    For lines weighted by their neighbours it is the mean ratio of own to pooled variance. For lines
+    weighted by their own variance see `OwnWeights`.
     """
     out, count = 0.0, 0
     for one, weights in zip(data, weighing, strict=True):
@@ -154,10 +156,10 @@ def _explained(data: Sequence[MeasuredResponse], weighing: Sequence[Real | None]
 
 
 def _related(data: Sequence[MeasuredResponse], residual: Complex) -> float:
-    """Correlation of residuals one line apart, in standard deviations.
+    """Return the correlation of residuals one line apart, in standard deviations.
 
-    The products at every line, of all elements together, are their own yardstick, so elements
-    may be correlated with each other and lines unequal.
+    The scatter of the products themselves, summed over elements at every line, gives the standard
+    deviation. Elements may therefore be correlated, and lines may differ in size.
     """
     products, first = [], 0
     for one in data:

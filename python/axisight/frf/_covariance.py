@@ -12,13 +12,12 @@ _DIMS = ("frequency_hz", "element", "element_2")
 
 
 def with_covariance(dataset: xr.Dataset, u: Complex, y: Complex) -> xr.Dataset:
-    """Add the covariances of the elements to an estimate of `mfrf`.
+    """Return an estimate of `mfrf` with the covariances of its elements.
 
-    ``u`` and ``y`` are spectra (n_freq, channel, experiment, period). To first order
-    ``dG = E V``, V = U^+, with the errors E of the columns of ``Y - G U`` independent between
-    experiments: ``E dG_oi conj(dG_pj) = sum_e C_e[o, p] V_ei conj(V_ej)``. C_e comes from the
-    scatter of the periods; with more experiments than inputs, one C for all, from what the
-    experiments leave of ``Y - G U``.
+    ``u`` and ``y`` are spectra (n_freq, channel, experiment, period). To first order ``dG = E V`` with
+    V = U^+ and the errors E, the columns of ``Y - G U``, which are independent between experiments:
+    ``E dG_oi conj(dG_pj) = sum_e C_e[o, p] V_ei conj(V_ej)``. C_e comes from the scatter of the
+    periods. With more experiments than inputs, one C for all comes from the residuals ``Y - G U``.
     """
     usable = ~lost_lines(dataset["flag"].values)
     g = dataset["response"].values[usable]

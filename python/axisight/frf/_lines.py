@@ -1,4 +1,4 @@
-"""What the estimators share: spectra of records, the motion wanted, state of the input."""
+"""Shared by the estimators: spectra of records, quantity of the output, flags of the input."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from axisight.records.periodic import PeriodicRecords
 Quantity = Literal["position", "velocity", "acceleration"]
 ORDER: dict[Quantity, int] = {"position": 0, "velocity": 1, "acceleration": 2}
 RATES: dict[Quantity, str] = {"position": "", "velocity": "/s", "acceleration": "/s^2"}
-"""What follows the unit of the position in that of its derivatives."""
+"""Suffix of the unit of position for each derivative."""
 
 SMALLEST = 1e-12
 """Amplitudes and singular values below this share of the largest are rounding."""
@@ -26,19 +26,19 @@ LARGE_CONDITION = 1e3
 
 
 def line_factor(frequency_hz: Real, quantity: Quantity) -> Complex:
-    """``(i w)^p`` on the lines, for the p-th derivative of a recorded position."""
+    """Return ``(i w)^p`` at the lines, for the p-th derivative of a recorded position."""
     one_of("quantity", quantity, ORDER)
     return np.asarray((2j * np.pi * frequency_hz) ** ORDER[quantity], np.complex128)
 
 
 def output_unit(records: PeriodicRecords | ArbitraryRecords, quantity: Quantity) -> str:
-    """Unit of the output, seconds added."""
+    """Return the unit of the output, with seconds for derivatives."""
     one_of("quantity", quantity, ORDER)
     return records.output_unit + RATES[quantity]
 
 
 def provenance(records: PeriodicRecords, quantity: Quantity) -> dict[str, Any]:
-    """Attributes every estimate from records carries."""
+    """Return the attributes of every estimate from records."""
     return {
         "quantity": quantity,
         "n_experiments": records.n_experiments,
@@ -51,7 +51,7 @@ def provenance(records: PeriodicRecords, quantity: Quantity) -> dict[str, Any]:
 def expect_options(
     records: PeriodicRecords, quantity: Quantity, remove_drift: bool, threads: int
 ) -> None:
-    """Check what every estimator of periodic records takes."""
+    """Check the arguments common to all estimators of periodic records."""
     instance("records", records, PeriodicRecords)
     one_of("quantity", quantity, ORDER)
     switch("remove_drift", remove_drift)
@@ -61,7 +61,7 @@ def expect_options(
 def line_spectra(
     signal: Real, lines: Lines, *, remove_drift: bool = False, threads: int = 1
 ) -> Complex:
-    """DFT of every period of a signal on lines, (n_freq, channel, experiment, period)."""
+    """Return the DFT of every period of a signal at lines, (n_freq, channel, experiment, period)."""
     found = _core.record_spectra(signal, lines.tolist(), remove_drift=remove_drift, threads=threads)
     return np.ascontiguousarray(found.transpose(2, 3, 0, 1))
 
@@ -74,9 +74,9 @@ def spectra(
     threads: int,
     lines: Lines | None = None,
 ) -> tuple[Complex, Complex]:
-    """Spectra of input and output, (n_freq, channel, experiment, period).
+    """Return the spectra of input and output, (n_freq, channel, experiment, period).
 
-    On the excited lines, or on others.
+    ``lines`` are the excited lines by default.
     """
     at = records.lines if lines is None else lines
     factor = line_factor(at / (records.n_samples * records.sample_time_s), quantity)
@@ -88,12 +88,12 @@ def spectra(
 
 
 def lost_lines(flag: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Whether a line has no estimate."""
+    """Return which lines have no estimate."""
     return np.asarray((flag == Flag.RANK_DEFICIENT) | (flag == Flag.NO_EXCITATION))
 
 
 def worst_flag(flags: NDArray[np.int8]) -> NDArray[np.int8]:
-    """The worst along the first axis: no excitation, then deficient, then ill-conditioned."""
+    """Return the worst flag along the first axis: no excitation, then deficient, then ill-conditioned."""
     out = np.full(flags.shape[1:], Flag.GOOD, np.int8)
     for flag in (Flag.ILL_CONDITIONED, Flag.RANK_DEFICIENT, Flag.NO_EXCITATION):
         out[(flags == flag).any(axis=0)] = flag
@@ -101,13 +101,13 @@ def worst_flag(flags: NDArray[np.int8]) -> NDArray[np.int8]:
 
 
 def in_noise(u: Complex) -> NDArray[np.bool_]:
-    """Whether the weakest direction of U at each line is lost in the scatter of the periods.
+    """Return at which lines the weakest direction of U is lost in the scatter of the periods.
 
-    ``u`` is (n_freq, n_inputs, n_experiments, n_periods), as many experiments as inputs or more.
-    The rule of the compiled estimate: the smallest singular value of the mean, rows scaled to
-    one, below twice the root mean square of the noise along a direction. A record whose
-    periods are no copies of one another (at half of its lines even the strongest direction is
-    lost) has no such noise, and nothing is said of it.
+    ``u`` is (n_freq, n_inputs, n_experiments, n_periods), with at least as many experiments as inputs.
+    Like the compiled estimate, it compares the smallest singular value of the mean, rows scaled to
+    one, with twice the rms of the noise along a direction. If even the strongest direction is lost at
+    half of the lines, the periods are not copies of one another and their scatter is not noise; then
+    no line is lost.
     """
     periods = u.shape[3]
     if periods < 2:
@@ -127,7 +127,7 @@ def in_noise(u: Complex) -> NDArray[np.bool_]:
 
 
 def condition_and_flag(u: Complex) -> tuple[Real, NDArray[np.int8]]:
-    """Condition number of U (n_freq, n_inputs, n_columns), rows scaled to one, and flags."""
+    """Return the condition number of U (n_freq, n_inputs, n_columns), rows scaled to one, and flags."""
     norm = np.linalg.norm(u, axis=2)
     silent = np.any(norm <= SMALLEST * norm.max(axis=0), axis=1)
     scaled = u / np.where(norm > 0, norm, 1.0)[:, :, None]
@@ -144,7 +144,7 @@ def condition_and_flag(u: Complex) -> tuple[Real, NDArray[np.int8]]:
 
 
 def expect_experiments(records: PeriodicRecords, why: str) -> None:
-    """Raise InputError where the experiments are too few for any line."""
+    """Raise InputError if there are fewer experiments than inputs."""
     if records.n_experiments < records.n_inputs:
         raise InputError(
             f"records: expected at least {records.n_inputs} experiments for "

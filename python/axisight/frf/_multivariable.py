@@ -1,4 +1,4 @@
-"""``G = Y V``: what the compiled estimate gives, as the Dataset of every estimator."""
+"""The compiled estimate ``G = Y V`` as the Dataset of `frequency_response`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def estimate(
     remove_drift: bool,
     threads: int,
 ) -> xr.Dataset:
-    """Estimate with ``V = U^+``, or ``R^+ (U R^+)^-1`` by the reference."""
+    """Return ``G = Y V`` with ``V = U^+``, or ``V = R^+ (U R^+)^-1`` if ``by_reference``."""
     found = _core.multivariable(
         records.input,
         records.output,

@@ -1,4 +1,4 @@
-"""Responses of single realizations, and what their scatter says."""
+"""Responses of single realizations, and averages with variances from their scatter."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Stack:
         return np.asarray(np.isfinite(self.response).all(axis=(2, 3), keepdims=True))
 
     def mean(self, values: Complex) -> Complex:
-        """Mean over the usable realizations, NaN where there is none."""
+        """Return the mean over the usable realizations, NaN without any."""
         usable = self.usable
         count = usable.sum(axis=0)
         total = np.where(usable, values, 0).sum(axis=0)
@@ -50,7 +50,7 @@ class Stack:
 
 
 def stack(data: Realizations, quantity: Quantity, remove_drift: bool, threads: int) -> Stack:
-    """Responses of each realization, estimated by `mfrf` where records are given."""
+    """Return the responses of all realizations; records are first estimated by `mfrf`."""
 
     def estimated(records: PeriodicRecords) -> xr.Dataset:
         return mfrf(records, quantity=quantity, remove_drift=remove_drift, threads=threads)
@@ -77,7 +77,7 @@ def stack(data: Realizations, quantity: Quantity, remove_drift: bool, threads: i
 
 
 def split(records: PeriodicRecords) -> list[PeriodicRecords]:
-    """One record set per realization: n_inputs experiments in a row."""
+    """Return one record set per realization of n_inputs consecutive experiments."""
     n = records.n_inputs
     expect_experiments(records, "not one whole realization")
     if records.n_experiments % n:
@@ -143,15 +143,15 @@ def _gather(datasets: Sequence[xr.Dataset]) -> Stack:
 def averaged(
     found: Stack, estimator: str, response: Complex, deviation: Complex, **attrs: Any
 ) -> xr.Dataset:
-    """Dataset of an average whose error is the mean of ``deviation`` over realizations.
+    """Return the Dataset of an average whose error is the mean of ``deviation`` over realizations.
 
-    ``deviation`` (realization, n_freq, n_out, n_in) is what each realization, linearized,
-    lies off the average. One realization alone has the variance of its periods.
+    ``deviation`` (realization, n_freq, n_out, n_in) is the linearized difference of each realization
+    from the average. A single realization keeps the variance of its periods.
     """
     usable = found.usable
     count = usable.sum(axis=0) * np.ones(response.shape, int)
     with np.errstate(divide="ignore", invalid="ignore"):
-        # What the deviations do not have in common; their mean is zero to first order.
+        # Subtracting the mean, zero to first order, leaves the scatter only.
         centre = found.mean(deviation)
         square = np.where(usable, np.abs(deviation - centre) ** 2, 0.0).sum(axis=0)
         scatter = square / (count * (count - 1.0))
@@ -161,7 +161,7 @@ def averaged(
     lost = count == 0
     flag = np.where(usable[:, :, 0, 0], found.flag, Flag.GOOD).max(axis=0)
     flag = np.where(lost[:, 0, 0], found.flag.max(axis=0), flag)
-    # The worst conditioned of the realizations that count.
+    # The worst condition over the usable realizations.
     condition = np.where(usable[:, :, 0, 0], found.condition, -np.inf).max(axis=0)
     dataset = frequency_response(
         found.frequency_hz,

@@ -15,25 +15,25 @@ def arithmetic_mean(
     remove_drift: bool = True,
     threads: int = 1,
 ) -> xr.Dataset:
-    """Average G over realizations, Wernholt (2004), (7.7).
+    """Return the mean of G over realizations, Wernholt (2004), (7.7).
 
     data
-        PeriodicRecords with whole realizations (n_inputs experiments in a row each), a list
-        of them, a list of Datasets as `mfrf` returns, or one Dataset with a dimension
-        ``realization``. Realizations need not be synchronized.
+        PeriodicRecords with whole realizations (each n_inputs consecutive experiments), a list
+        of them, a list of Datasets of `mfrf`, or one Dataset with a dimension ``realization``.
+        Realizations need not be synchronized.
     quantity, remove_drift, threads
-        As for `mfrf`, which estimates each realization; without effect on given Datasets.
+        As for `mfrf`, which estimates each realization; they do not affect given Datasets.
 
-    Returns the Dataset of `axisight.frf.frequency_response`. ``variance`` comes from the
-    scatter of the realizations: noise and the nonlinear distortion that changes with them;
-    ``noise_variance`` from their periods. The two are the same with one realization. A line
-    that a realization lacks is averaged over the others; ``condition`` is the worst.
+    Returns the Dataset of `axisight.frf.frequency_response`. ``variance`` comes from the scatter of
+    the realizations and includes noise and nonlinear distortion. ``noise_variance`` comes from their
+    periods. With one realization both are the same. A line that a realization lacks is averaged over
+    the others; ``condition`` is the worst.
 
-    Bias: exact without noise and distortion. Y U^-1 is a quotient, so that noise on U biases
-    every realization; the mean keeps that bias. It is the smallest of all averages where U
-    is far above its noise, and the average is ruled by outliers where it is not.
+    Bias: exact without noise and distortion. Noise on U biases the quotient Y U^-1 of every
+    realization, and the mean keeps that bias. The bias is the smallest of all averages if U is far
+    above its noise; otherwise outliers dominate the mean.
 
-    Raises InputError for a realization with experiments missing or responses that differ in
+    Raises InputError for a realization with missing experiments, and for responses that differ in
     shape or frequencies.
     """
     found = stack(data, quantity, remove_drift, threads)

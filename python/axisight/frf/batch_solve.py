@@ -1,4 +1,4 @@
-"""Small complex systems, many at a time."""
+"""Solution of many small complex systems at a time."""
 
 from __future__ import annotations
 
@@ -17,17 +17,16 @@ Complex = NDArray[np.complex128]
 def invert(
     matrices: NDArray[Any], *, out: Complex | None = None, threads: int = 1
 ) -> tuple[Complex, NDArray[np.bool_]]:
-    """Invert many small complex matrices, shape (..., n, n).
+    """Return the inverses of many small complex matrices, shape (..., n, n), and flags.
 
-    Returns the inverses and where a matrix is singular to working precision or not finite,
-    shape (...,); those inverses are NaN. Several matrices in lock-step: LU with partial pivoting
-    as in LAPACK's gesv, cofactors for the 3x3 where they are as accurate. ``threads`` 0 takes
+    The flags, shape (...,), are true for matrices that are singular to working precision or not
+    finite; their inverses are NaN. Several matrices run in lock-step: LU with partial pivoting as in
+    LAPACK's gesv, or cofactors for 3x3 matrices where they are as accurate. ``threads`` 0 takes
     every core and changes no bit of the result.
 
     out
-        Where to put the inverses: C-contiguous complex128 of the same shape, apart from
-        ``matrices``. Used again and again it saves what new memory costs, which for 3x3 is
-        about as much as inverting.
+        Array for the inverses: C-contiguous complex128 of the same shape, without overlap with
+        ``matrices``. Reuse it to avoid new memory, which for 3x3 costs about as much as inverting.
 
     Raises InputError for matrices that are not square and for an ``out`` that does not fit.
     """
@@ -56,10 +55,10 @@ def invert(
 def right_divide(
     y: NDArray[Any], u: NDArray[Any], *, threads: int = 1
 ) -> tuple[Complex, NDArray[np.bool_]]:
-    """Solve G U = Y, that is ``Y U^-1``, for many small complex matrices.
+    """Return G = ``Y U^-1`` for many small complex matrices, and the flags of `invert`.
 
-    ``y`` has shape (..., p, n), ``u`` (..., n, n) with the same leading axes; ``threads`` as for `invert`. Returns G,
-    (..., p, n), and flags as `invert`. Raises InputError for shapes that do not fit.
+    ``y`` has shape (..., p, n), ``u`` (..., n, n) with the same leading axes, and G (..., p, n).
+    ``threads`` is that of `invert`. Raises InputError for shapes that do not fit.
     """
     y = np.ascontiguousarray(complex_array("y", y))
     u = np.ascontiguousarray(complex_array("u", u))

@@ -12,19 +12,19 @@ from axisight.frf.response import DIMS, estimate_of
 
 
 def confidence_radius(dataset: xr.Dataset, probability: float = 0.95) -> xr.DataArray:
-    """Radius of the disc about each element of G that holds the truth with ``probability``.
+    """Return the radius of the disc about each element of G that holds the truth with ``probability``.
 
-    The error is taken as circular complex normal. A variance estimated from nu complex
-    degrees of freedom (``degrees_of_freedom``, a variable or one number among the attributes of
-    the Dataset, where there is one) widens the disc: |dG|^2 / variance is F(2, 2 nu), so that
+    The error is assumed circular complex normal. An estimated variance with nu complex degrees of
+    freedom widens the disc, because |dG|^2 / variance is F(2, 2 nu):
 
-        radius^2 = variance nu ((1 - probability)^(-1/nu) - 1),
+        radius^2 = variance nu ((1 - probability)^(-1/nu) - 1)
 
-    which tends to ``-variance ln(1 - probability)`` for a known variance. With eight periods
-    and one experiment (nu = 7) the disc is 12 % wider, with two periods (nu = 1) 2.5 times.
+    Here nu is ``degrees_of_freedom``, a variable or an attribute of the Dataset. For a known variance
+    the radius^2 tends to ``-variance ln(1 - probability)``. With eight periods and one experiment
+    (nu = 7) the disc is 12 % wider, with two periods (nu = 1) 2.5 times as wide.
 
-    Returns a DataArray as ``variance``; NaN where that is unknown. Raises InputError for a
-    probability outside (0, 1) or a Dataset without variance.
+    Returns a DataArray shaped as ``variance``, NaN where the variance is unknown. Raises InputError for
+    a probability outside (0, 1) or a Dataset without variance.
     """
     probability = between("probability", probability, 0, 1)
     estimate_of("dataset", dataset)
@@ -43,16 +43,15 @@ def confidence_radius(dataset: xr.Dataset, probability: float = 0.95) -> xr.Data
 
 
 def with_freedom(dataset: xr.Dataset, freedom: NDArray[np.float64]) -> xr.Dataset:
-    """Add complex degrees of freedom of ``variance``, shape (n_freq, n_out, n_in)."""
+    """Return the Dataset with complex degrees of freedom of ``variance``, (n_freq, n_out, n_in)."""
     return dataset.assign(degrees_of_freedom=(DIMS, freedom, {"units": "1"}))
 
 
 def median_freedom(dataset: xr.Dataset) -> float | None:
     """Return the median over the lines of the complex degrees of freedom of ``variance``.
 
-    None where the Dataset does not tell or says infinity: the variance then counts as known; or
-    has no variance. Raises InputError
-    for numbers that are not positive.
+    None without degrees of freedom or with infinite ones, because the variance then counts as known,
+    and None without a variance. Raises InputError for numbers that are not positive.
     """
     found = dataset.get("degrees_of_freedom", dataset.attrs.get("degrees_of_freedom"))
     if found is None or "variance" not in dataset or dataset["variance"].isnull().all():

@@ -1,13 +1,13 @@
 """Errors of ``Y U^-1`` in closed loop, Wernholt (2004), chapter 6.
 
-The loop of Figure 6.1: ``u = F (r - y)``, ``y = G (u + v_u) + v_y``. All spectra are complex
-of shape (n_freq, channel, experiment), responses (n_freq, n_out, n_in); a DFT's scale does not
-matter as long as it is the same for all. Outputs and disturbances are in one unit, e.g.
-motor position [rad] for all of G, F, Y, V. Leakage is neglected: periodic signals in steady
-state.
+The loop is that of Figure 6.1: ``u = F (r - y)``, ``y = G (u + v_u) + v_y``. All spectra are complex
+of shape (n_freq, channel, experiment), and responses are (n_freq, n_out, n_in). The scale of the DFT
+does not matter as long as it is the same for all. Outputs and disturbances have one unit, e.g.
+motor position [rad] for all of G, F, Y, V. Leakage is neglected, which holds for periodic signals in
+steady state.
 
-Every function raises InputError for shapes that do not fit. A line whose matrix is singular,
-and a ratio over zero, give NaN.
+Every function raises InputError for shapes that do not fit. A line with a singular matrix is NaN, and
+so is a ratio over zero.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def reference_to_output(response: ArrayLike, controller: ArrayLike) -> Complex:
 def total_disturbance(
     response: ArrayLike, input_disturbance: ArrayLike, output_disturbance: ArrayLike
 ) -> Complex:
-    """Return ``V = V_y + G V_u``, the disturbances as seen at the output, (6.7)."""
+    """Return ``V = V_y + G V_u``, the total disturbance at the output, (6.7)."""
     g = _stack("response", response)
     v_u = _stack("input_disturbance", input_disturbance)
     v_y = _stack("output_disturbance", output_disturbance)
@@ -66,9 +66,9 @@ def closed_loop_spectra(
 
 
 def estimation_error(disturbance: ArrayLike, input_: ArrayLike) -> Complex:
-    """Return the error ``V U^-1`` of the estimate ``Y U^-1``, exactly: Lemma 6.1.
+    """Return the exact error ``V U^-1`` of the estimate ``Y U^-1``, Lemma 6.1.
 
-    ``input_`` is U as it was measured, disturbances included, (n_freq, m, m).
+    ``input_`` is the measured U, including disturbances, (n_freq, m, m).
     """
     v, u = _stack("disturbance", disturbance), _stack("input", input_)
     return _product(v, _inverse(_square("input", u)))
@@ -77,7 +77,7 @@ def estimation_error(disturbance: ArrayLike, input_: ArrayLike) -> Complex:
 def error_from_reference(
     disturbance: ArrayLike, reference: ArrayLike, response: ArrayLike, controller: ArrayLike
 ) -> Complex:
-    """Return the error from reference and disturbance, exactly: (6.15) with (6.16)."""
+    """Return the exact error of ``Y U^-1`` from reference and disturbance, (6.15) with (6.16)."""
     r, v = _stack("reference", reference), _stack("disturbance", disturbance)
     _same("disturbance", v, r.shape)
     inverse = _inverse(_square("reference", r) - v)
@@ -87,7 +87,7 @@ def error_from_reference(
 def approximate_error(
     disturbance: ArrayLike, reference: ArrayLike, response: ArrayLike, controller: ArrayLike
 ) -> Complex:
-    """Return the error to first order in the disturbance: ``V R^-1 (G + F^-1)``, (6.17)."""
+    """Return the error ``V R^-1 (G + F^-1)``, to first order in the disturbance, (6.17)."""
     r, v = _stack("reference", reference), _stack("disturbance", disturbance)
     inverse = _inverse(_square("reference", r))
     return _product(_product(v, inverse), _inverse_input(response, controller))
@@ -100,7 +100,7 @@ def approximate_error_directions(
     response: ArrayLike,
     controller: ArrayLike,
 ) -> Complex:
-    """Return (6.17) for ``r = T r_0``: ``V T^-1 (G + F^-1) / R_0``, (6.18).
+    """Return the error (6.17) for ``r = T r_0``: ``V T^-1 (G + F^-1) / R_0``, (6.18).
 
     ``scalar_reference`` is R_0, (n_freq,); ``directions`` is T, (m, m).
     """
@@ -114,8 +114,8 @@ def approximate_error_directions(
 def error_variance(disturbance_power: ArrayLike, input_: ArrayLike) -> Real:
     """Return ``E|dG|^2`` for disturbances independent of the excitation and between experiments.
 
-    To first order, ``E|V_i|^2 sum_e |U^-1_ej|^2`` for element (i, j); exact for known U.
-    ``disturbance_power`` is ``E|V_i|^2``, (n_freq, n_out), averages over periods included;
+    Element (i, j) is ``E|V_i|^2 sum_e |U^-1_ej|^2``, to first order, or exact for known U.
+    ``disturbance_power`` is ``E|V_i|^2``, (n_freq, n_out), after averaging over periods;
     ``input_`` is U without the disturbance, (n_freq, m, m).
     """
     u = _stack("input", input_)
@@ -130,7 +130,7 @@ def error_variance(disturbance_power: ArrayLike, input_: ArrayLike) -> Real:
 def directions_gain(directions: ArrayLike) -> Real:
     """Return the power that ``T^-1`` passes from disturbances to each column, (m,).
 
-    Disturbances independent of the excitation weigh ``sum_e |T^-1_ej|^2``: 1 for T1 = I,
+    For disturbances independent of the excitation the gain is ``sum_e |T^-1_ej|^2``: 1 for T1 = I,
     1/2 for T2, 1/m for a Hadamard matrix (section 6.3.3).
     """
     inverse = _inverse(_directions(directions)[None])[0]
@@ -147,8 +147,8 @@ def relative_error(estimate: ArrayLike, true: ArrayLike) -> Complex:
 def mean_relative_error(estimate: ArrayLike, true: ArrayLike) -> Real:
     """Return the mean over frequency of the magnitude of the relative error, (6.4).
 
-    Frequency is the first axis; lines that are NaN are left out, an element without any
-    other is NaN.
+    Frequency is the first axis. The mean leaves out lines that are NaN; an element without other lines
+    is NaN.
     """
     magnitude = np.abs(relative_error(estimate, true))
     counted = np.isfinite(magnitude)
@@ -159,7 +159,7 @@ def mean_relative_error(estimate: ArrayLike, true: ArrayLike) -> Real:
 def signal_to_noise_ratio(signal: ArrayLike, disturbance: ArrayLike) -> Real:
     """Return ``|X|^2 / |V|^2`` element by element, (8.10) and (8.11); NaN without disturbance.
 
-    In dB this is ``10 log10`` of it.
+    The ratio is one of powers: in dB it is ``10 log10`` of it.
     """
     x, v = _any_shape("signal", signal), _any_shape("disturbance", disturbance)
     _same("disturbance", v, x.shape)
@@ -172,7 +172,7 @@ def spectral_analysis_limit(
     reference_spectrum: ArrayLike,
     disturbance_spectrum: ArrayLike,
 ) -> Complex:
-    """Return what direct spectral analysis (H1) tends to in the loop ``u = r - F_y y``, (3.66).
+    """Return the limit of direct spectral analysis (H1) in the loop ``u = r - F_y y``, (3.66).
 
     ``G - Phi_v F_y^H (Phi_r + F_y Phi_v F_y^H)^-1 (I + F_y G)``, which for one channel is
     ``(G Phi_r - conj(F_y) Phi_v) / (Phi_r + |F_y|^2 Phi_v)``. Spectra are (n_freq, m, m) and
@@ -209,7 +209,7 @@ def _any_shape(name: str, value: ArrayLike) -> Complex:
 
 
 def _without_infinity(array: Complex) -> Complex:
-    """What is infinite is unknown: products of it would be NaN anyway, or infinite."""
+    """Return the array with NaN for infinity, because products with infinity are not meaningful."""
     return np.asarray(np.where(np.isfinite(array), array, np.nan))
 
 

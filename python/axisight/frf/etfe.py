@@ -1,4 +1,4 @@
-"""The empirical transfer function estimate of one input, smoothed if wanted."""
+"""The empirical transfer function estimate of one input, with optional smoothing."""
 
 from __future__ import annotations
 
@@ -24,18 +24,19 @@ def etfe(
     remove_drift: bool = True,
     threads: int = 1,
 ) -> xr.Dataset:
-    """Estimate G = Y / U of one input, periods averaged, then the mean over experiments.
+    """Return G = Y / U of one input, from averaged periods, as the mean over experiments.
 
-    Wernholt (2004), (3.45); with ``bandwidth_hz`` smoothed over the lines by (3.46) with a
-    Hann window of that half width. ``weighting`` "input_power" weighs each line with |U|^2
-    as well, which makes it spectral analysis (3.49). ``quantity``, ``remove_drift``,
-    ``threads``, Dataset and the meaning of the variances as for `mfrf` and `arithmetic_mean`.
+    Wernholt (2004), (3.45). With ``bandwidth_hz`` [Hz], the estimate is smoothed over the lines by
+    (3.46), with a Hann window of that half width. ``weighting`` "input_power" also weights each line
+    with |U|^2, which gives spectral analysis (3.49). ``quantity``, ``remove_drift``, ``threads``,
+    Dataset and variances are those of `mfrf` and `arithmetic_mean`.
 
     Bias: exact for periodic records without noise. Without smoothing the variance does not
     fall with the length of a record that is not periodic. Smoothing flattens resonances, see
     `smooth`.
 
-    Raises InputError for more than one input (use `mfrf`, then `smooth`).
+    Raises InputError for more than one input (use `mfrf`, then `smooth`), and for "input_power"
+    without ``bandwidth_hz``.
     """
     expect_options(records, quantity, remove_drift, threads)
     if records.n_inputs != 1:

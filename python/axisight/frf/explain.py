@@ -1,4 +1,4 @@
-"""Flags in words."""
+"""Explanation of flags in words."""
 
 from __future__ import annotations
 
@@ -21,17 +21,16 @@ REASON = {
 
 
 def explain_flags(dataset: xr.Dataset, records: PeriodicRecords | None = None) -> list[str]:
-    """Say in words which lines are flagged and why, one sentence for each run of lines.
+    """Return one sentence for each run of flagged lines, with the reason.
 
     dataset
-        What an estimator returned.
+        The Dataset of an estimator.
     records
-        The records it was made of, if the inputs to blame are to be named: those without
-        amplitude, or the combination of inputs that no experiment excites (each input
-        scaled to its own amplitude).
+        The records of the estimate. With them the sentences name the inputs without amplitude, or the
+        combination of inputs that no experiment excites (each input scaled to its own amplitude).
 
-    Returns an empty list where every line is good. Raises InputError where ``dataset`` has no
-    flags or ``records`` has other lines.
+    Returns an empty list if every line is good. Raises InputError if ``dataset`` has no flags or
+    ``records`` has other lines.
     """
     estimate_of("dataset", dataset)
     frequency = dataset["frequency_hz"].values
@@ -73,7 +72,7 @@ def _blame(u: Complex, run: NDArray[np.int64], flag: Flag) -> str:
     if u.shape[2] < u.shape[1]:
         return f"{u.shape[2]} experiments for {u.shape[1]} inputs"
     left, value, _ = np.linalg.svd(scaled)
-    # The largest entry is made real and positive.
+    # The phase of the vector is arbitrary, so its largest entry is made real and positive.
     weakest = left[:, -1].conj()
     weakest = weakest * np.exp(-1j * np.angle(weakest[np.argmax(np.abs(weakest))]))
     terms = [

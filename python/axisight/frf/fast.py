@@ -24,7 +24,7 @@ from axisight.frf.robust import by_realization, excitation, inverse, period_vari
 from axisight.records.periodic import PeriodicRecords
 
 NEIGHBOURS = 6
-"""Detection lines averaged for the distortion at an excited line between them."""
+"""Number of nearest detection lines whose mean gives the distortion at an excited line."""
 
 
 class FastMethod(NamedTuple):
@@ -44,23 +44,22 @@ def fast_method(
     """Return the response and the levels of noise, odd and even distortion.
 
     Source: Pintelon and Schoukens (2012), section 4.3.2. At a line without excitation a
-    steady-state linear system has no output; what is there, beyond noise, is nonlinear
+    steady-state linear system has no output. Any output there, beyond noise, is nonlinear
     distortion: of even degree at even lines and of odd degree at odd lines, if all excited
     lines are odd.
 
     records
         One realization, that is ``n_inputs`` experiments, of P >= 2 periods in steady state.
-        ``records.detection_lines`` are used; without any, all lines free of excitation
+        The method uses ``records.detection_lines`` or, without any, all lines free of excitation
         between the first and the last excited one.
     quantity, remove_drift, threads
-        As for `mfrf`. Everything is found from the recorded output, then multiplied by i w or
-        (i w)^2: response, variances and distortion alike.
+        As for `mfrf`. The factor i w or (i w)^2 applies to response, variances and distortion alike.
 
     ``response``, the Dataset of every estimator, is ``Y U^-1`` at the excited lines.
-    ``noise_variance`` is from the scatter over the periods (P - 1 complex degrees of
-    freedom). ``variance`` adds the distortion power of the detection lines of the same parity,
-    mean of the nearest 6; it is NaN where no such lines exist. That takes the distortion at
-    excited lines to be as large as at detection lines, which holds on random grids.
+    ``noise_variance`` comes from the scatter over the periods (P - 1 complex degrees of freedom).
+    ``variance`` adds the mean distortion power of the 6 nearest detection lines of the same parity; it
+    is NaN without such lines. This assumes that distortion at excited lines is as large as at
+    detection lines, which holds on random grids.
 
     ``distortion``, over the detection lines, with coordinates ``line`` and ``kind``
     ("odd" or "even"):
@@ -75,15 +74,14 @@ def fast_method(
     input_amplitude  frequency_hz, input, experiment     ``2 / N U_d`` [input unit]
     ================ =================================== =====================================
 
-    In a loop, or behind an actuator that is not linear, distortion reaches the input as
-    well; ``G_d U_d`` is what the linear system makes of that, and is no distortion of its
-    own. G_d is interpolated linearly between excited lines and constant beyond them. Its
-    error counts times ``U_d``, to second order. ``|distortion|^2`` holds the noise too:
-    without any distortion ``|distortion|^2 / noise_variance`` is F distributed with 2 and
-    2 (P - 1) degrees of freedom.
+    In a loop, or behind a nonlinear actuator, distortion also reaches the input. ``G_d U_d`` is the
+    response of the linear system to it, so it is subtracted. G_d is interpolated linearly between
+    excited lines and constant beyond them; its error has a second-order effect, through ``U_d``.
+    ``|distortion|^2`` includes the noise: without distortion, ``|distortion|^2 / noise_variance`` is
+    F distributed with 2 and 2 (P - 1) degrees of freedom.
 
-    Raises InputError for a single period, other than ``n_inputs`` experiments and no
-    detection line.
+    Raises InputError for a single period, for another number of experiments than ``n_inputs``, and
+    without a detection line.
     """
     expect_options(records, quantity, remove_drift, threads)
     n, periods = records.n_inputs, records.n_periods
@@ -144,7 +142,7 @@ def fast_method(
 
 
 def _freedom(noise: Real, share: Real, periods: int, n_detection: int) -> Real:
-    """Complex degrees of freedom of the sum of two variances (Satterthwaite 1946)."""
+    """Return the complex degrees of freedom of the sum of two variances (Satterthwaite 1946)."""
     with np.errstate(invalid="ignore", divide="ignore"):
         spread = noise**2 / (periods - 1) + share**2 / min(NEIGHBOURS, n_detection)
         return np.asarray((noise + share) ** 2 / spread)
@@ -161,7 +159,7 @@ def _detection_lines(records: PeriodicRecords) -> NDArray[np.int64]:
 
 
 def _interpolate(lines: NDArray[np.int64], response: Complex, at: NDArray[np.int64]) -> Complex:
-    """Interpolate linearly over lines, leaving out those that are NaN."""
+    """Return the response at other lines, interpolated linearly without the lines that are NaN."""
     known = np.all(np.isfinite(response), axis=(1, 2))
     flat = response.reshape(len(lines), -1)[known]
     if not len(flat):
@@ -171,7 +169,7 @@ def _interpolate(lines: NDArray[np.int64], response: Complex, at: NDArray[np.int
 
 
 def _at_excited(excited: NDArray[np.int64], detection: NDArray[np.int64], power: Real) -> Real:
-    """Mean power of the nearest detection lines of the same parity; NaN without any."""
+    """Return the mean power of the nearest detection lines of the same parity, NaN without any."""
     out = np.full((len(excited), *power.shape[1:]), np.nan)
     for parity in (0, 1):
         here, there = excited % 2 == parity, detection % 2 == parity

@@ -33,20 +33,20 @@ def h1(
     remove_drift: bool = True,
     threads: int = 1,
 ) -> xr.Dataset:
-    """Estimate G = S_yu S_uu^-1, every period of every experiment one record.
+    """Return the H1 estimate G = S_yu S_uu^-1, with every period of every experiment as one record.
 
-    S_yu is the sum of Y U^H and S_uu that of U U^H. Records need not be synchronized.
+    S_yu is the sum of Y U^H, and S_uu that of U U^H. Records need not be synchronized.
     Pintelon and Schoukens (2001), section 2.6; Bendat and Piersol, Random Data.
 
-    ``quantity``, ``remove_drift`` and ``threads`` as for `mfrf`. The Dataset has the
-    multiple ``coherence`` of each output as well. ``variance``: from what each experiment
-    leaves of Y - G U, noise and distortion together, with more experiments than inputs;
-    else from the periods, noise only.
+    ``quantity``, ``remove_drift`` and ``threads`` are those of `mfrf`. The Dataset also has the
+    multiple ``coherence`` of each output. With more experiments than inputs, ``variance`` comes from
+    the residuals Y - G U of the experiments and includes noise and distortion. Otherwise it comes
+    from the periods and includes noise only.
 
     Bias: noise on U makes the response too small, by the noise-to-signal power ratio of U;
-    averaging does not help. In closed loop noise fed back pulls G towards minus the inverse
-    of the controller. Exact without noise and distortion. On robots it has been found the
-    worst of all estimators; it is here because everybody compares with it.
+    averaging does not help. In closed loop, noise fed back pulls G towards minus the inverse
+    of the controller. H1 is exact without noise and distortion. On robots it is the worst of all
+    estimators; it is here as the usual reference for comparison.
 
     Raises InputError for fewer experiments than inputs.
     """
@@ -60,13 +60,13 @@ def h2(
     remove_drift: bool = True,
     threads: int = 1,
 ) -> xr.Dataset:
-    """Estimate G = S_yy S_uy^-1, for as many outputs as inputs.
+    """Return the H2 estimate G = S_yy S_uy^-1, for as many outputs as inputs.
 
-    ``quantity``, ``remove_drift``, ``threads``, Dataset and errors as for `h1`; raises
-    InputError too where the numbers of inputs and outputs differ.
+    ``quantity``, ``remove_drift``, ``threads``, Dataset and errors are those of `h1`; also raises
+    InputError if the numbers of inputs and outputs differ.
 
     Bias: noise on Y makes the response too large, by the noise-to-signal power ratio of Y;
-    noise on U averages out. Exact without noise and distortion.
+    noise on U averages out. H2 is exact without noise and distortion.
     """
     instance("records", records, PeriodicRecords)
     if records.n_outputs != records.n_inputs:
@@ -86,7 +86,7 @@ class _Uncertainty(NamedTuple):
 def _by_instrument(
     records: PeriodicRecords, name: str, quantity: Quantity, remove_drift: bool, threads: int
 ) -> xr.Dataset:
-    """G = (sum Y Z^H) (sum U Z^H)^-1 with Z = U for H1 and Y for H2."""
+    """Return the estimate (sum Y Z^H) (sum U Z^H)^-1, with Z = U for H1 and Z = Y for H2."""
     expect_options(records, quantity, remove_drift, threads)
     expect_experiments(records, "S_uu is singular at every line")
     u, y = spectra(records, quantity, remove_drift=remove_drift, threads=threads)
@@ -104,7 +104,7 @@ def _by_instrument(
     power = np.sum(np.abs(flat_y) ** 2, axis=2)
     left = np.sum(np.abs(residual) ** 2, axis=2)
     share = np.divide(left, power, out=np.full_like(power, np.nan), where=power > 0)
-    # G by single records: what each adds to the error, (line, output, input, record).
+    # The contribution of each record to the error, (line, output, input, record).
     weight, _ = right_divide(z.conj().swapaxes(1, 2), crossed, threads=threads)
     parts = np.einsum("fir,frj->fijr", residual, weight)
     shape = (*response.shape, records.n_experiments, records.n_periods)
@@ -130,7 +130,7 @@ def _cross(a: Complex, b: Complex) -> Complex:
 
 
 def _uncertainty(parts: Complex, n_inputs: int) -> _Uncertainty:
-    """Variances from the parts of the error, (..., experiment, period)."""
+    """Return the variances from the contributions to the error, (..., experiment, period)."""
     n_experiments, n_periods = parts.shape[-2:]
     noise = None
     freedom = float("nan")

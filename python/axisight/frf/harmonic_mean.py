@@ -19,19 +19,17 @@ def harmonic_mean(
     remove_drift: bool = True,
     threads: int = 1,
 ) -> xr.Dataset:
-    """Average the inverse responses: G is the inverse of the mean of the matrices G_j^-1.
+    """Return the inverse of the mean of the inverse responses G_j^-1.
 
     Wernholt and Moberg (2008). ``data``, ``quantity``, ``remove_drift``, ``threads``,
-    Dataset and errors as for `arithmetic_mean`; the variance is that of the mean inverse,
-    carried over by dG = -G d(G^-1) G. Lines where G_j is singular are lost for that
-    realization.
+    Dataset and errors are those of `arithmetic_mean`. The variance is that of the mean inverse,
+    carried over by dG = -G d(G^-1) G. A realization loses the lines where its G_j is singular.
 
-    Bias: exact without noise and distortion. G^-1 = U Y^-1 divides by the output, so that
-    noise on U averages out and noise on Y biases: the choice in closed loop where the
-    controller feeds noise into U and the output is measured well, and the wrong one where
-    Y is small (anti-resonances).
+    Bias: exact without noise and distortion. G^-1 = U Y^-1 divides by the output, so that noise on U
+    averages out and noise on Y biases the result. Use it in closed loop if the controller feeds noise
+    into U and the output is measured well. Do not use it where Y is small (anti-resonances).
 
-    Raises InputError as well where the numbers of inputs and outputs differ.
+    Also raises InputError if the numbers of inputs and outputs differ.
     """
     found = stack(data, quantity, remove_drift, threads)
     n_outputs, n_inputs = found.response.shape[2:]

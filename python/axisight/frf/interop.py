@@ -1,7 +1,7 @@
 """Frequency responses to and from python-control, SciPy and NetCDF.
 
-Everywhere the sign is that of ``exp(+i w t)``: a lag has a negative phase. What differs is the
-order of axes and the unit of frequency:
+All of them use the sign of ``exp(+i w t)``: a lag has a negative phase. They differ in the order of
+axes and the unit of frequency:
 
 ========================================= ===================== ==========================
 where                                     response              frequency
@@ -35,8 +35,8 @@ Complex = NDArray[np.complex128]
 def to_control(response: xr.Dataset) -> Any:
     """Return a ``control.FrequencyResponseData`` of the lines that are not NaN.
 
-    ``response`` is a Dataset of :func:`frequency_response`. Uncertainty and flags have no place
-    there and are lost. Raises InputError if no line is left, MissingExtraError without python-control.
+    ``response`` is a Dataset of :func:`frequency_response`. The result has no uncertainty and no
+    flags. Raises InputError if no line is left, and MissingExtraError without python-control.
     """
     control = _control()
     data = _response(response)
@@ -50,8 +50,9 @@ def to_control(response: xr.Dataset) -> Any:
 def from_control(frd: Any, *, input_unit: str = "Nm", output_unit: str = "rad") -> xr.Dataset:
     """Return the Dataset of a ``control.FrequencyResponseData``, lines in ascending order.
 
-    The response lines of ``frd`` are kept; its variance is unknown. Raises InputError for another
-    type (a model has no lines: use :func:`evaluate`), MissingExtraError without python-control.
+    The variance is NaN, because ``frd`` has none. ``input_unit`` and ``output_unit`` are labels.
+    Raises InputError for another type (use :func:`evaluate` for a model, which has no lines), and
+    MissingExtraError without python-control.
     """
     control = _control()
     if not isinstance(frd, control.FrequencyResponseData):
@@ -76,8 +77,8 @@ def to_scipy(
 ) -> tuple[Real, Complex]:
     """Return ``(w, H)`` of one element as ``scipy.signal.freqresp`` does, each (n_freq,).
 
-    ``output`` and ``input`` count from 1. ``w`` is in rad/s, or with ``sample_time_s`` in
-    rad/sample as ``dfreqresp`` has it. Raises InputError for an element that is not there.
+    ``output`` and ``input`` count from 1. ``w`` is in rad/s, or, if ``sample_time_s`` [s] is given,
+    in rad/sample like ``dfreqresp``. Raises InputError for an element that does not exist.
     """
     _response(response)
     for name, value in (("output", output), ("input", input)):
@@ -138,9 +139,9 @@ def evaluate(
     """Return the exact response of a SciPy system at the given lines, variance zero.
 
     system
-        ``scipy.signal.lti`` (at ``s = i w``) or ``dlti`` (at ``z = exp(i w T)``), of any
-        representation; in state space it may have several inputs and outputs. State-space models
-        are solved line by line and never turned into polynomials, which loses digits.
+        ``scipy.signal.lti`` (at ``s = i w``) or ``dlti`` (at ``z = exp(i w T)``), in any
+        representation. State-space systems may have several inputs and outputs; they are solved line
+        by line, because a conversion to polynomials would lose digits.
     frequency_hz
         Lines [Hz], (n_freq,), ascending.
     input_unit, output_unit
@@ -201,9 +202,9 @@ def _evaluated(system: Any, at: Complex) -> Complex:
 def save_netcdf(response: xr.Dataset, path: Path | str) -> None:
     """Write a response to a NetCDF 3 file, complex variables as ``NAME_real`` and ``NAME_imag``.
 
-    ``response`` is any Dataset over ``frequency_hz`` of this package, also the levels of
-    :func:`fast_method`; :func:`load_netcdf` gives it back. Raises InputError for an attribute
-    NetCDF cannot hold, naming it, and a place that cannot be written.
+    ``response`` is any Dataset of this package over ``frequency_hz``, including the distortion of
+    :func:`fast_method`; :func:`load_netcdf` reads it again. Raises InputError for an attribute that
+    NetCDF cannot hold, and for a path that cannot be written.
     """
     target = path_of("path", path)
     _expect_lines(response)
@@ -224,9 +225,9 @@ def save_netcdf(response: xr.Dataset, path: Path | str) -> None:
 
 
 def load_netcdf(path: Path | str) -> xr.Dataset:
-    """Read what :func:`save_netcdf` wrote at ``path``.
+    """Return the Dataset that :func:`save_netcdf` wrote to ``path``.
 
-    Raises InputError if the file cannot be read or holds nothing over frequency.
+    Raises InputError if the file cannot be read or has no variable over frequency.
     """
     source = path_of("path", path)
     try:
@@ -253,7 +254,7 @@ def load_netcdf(path: Path | str) -> xr.Dataset:
 
 
 def _expect_lines(response: object) -> None:
-    """Refuse what is not over frequency; a response is, and so are levels of distortion."""
+    """Raise InputError unless this is a Dataset over frequency: a response, or distortion."""
     if not isinstance(response, xr.Dataset):
         raise InputError(f"response: expected a Dataset, got {type(response).__name__}")
     if "frequency_hz" not in response.dims:
@@ -262,7 +263,7 @@ def _expect_lines(response: object) -> None:
 
 
 def _response(response: xr.Dataset) -> Complex:
-    """The array (n_freq, n_out, n_in), or what is wrong."""
+    """Return the array (n_freq, n_out, n_in); raises InputError for another Dataset."""
     found = response.get("response") if isinstance(response, xr.Dataset) else None
     if found is None or set(found.dims) != set(DIMS):
         raise InputError(f"response: expected a Dataset with a variable response over {DIMS}")
@@ -270,7 +271,7 @@ def _response(response: xr.Dataset) -> Complex:
 
 
 def _control() -> Any:
-    """Return the module of the optional extra."""
+    """Return the module ``control``; raises MissingExtraError if it is not installed."""
     try:
         return importlib.import_module("control")
     except ImportError as error:

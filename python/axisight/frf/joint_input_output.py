@@ -17,21 +17,21 @@ def joint_input_output(
     remove_drift: bool = True,
     threads: int = 1,
 ) -> xr.Dataset:
-    """Estimate G = G_yr G_ur^-1, the responses from the reference to output and input.
+    """Return G = G_yr G_ur^-1, from the responses of output and input to the reference.
 
     G_yr = Y R^+ and G_ur = U R^+ with the pseudo-inverse over all experiments. With as many
-    experiments as inputs R cancels and the result is that of `mfrf`; the use of it lies in
-    many experiments, where noise that does not come from R averages out of both. Wernholt
-    (2004), section 3.4.2; Pintelon and Schoukens (2001), section 2.6.
+    experiments as inputs R cancels, and the result is that of `mfrf`. With many experiments, noise
+    that does not come from R averages out of both responses. Wernholt (2004), section 3.4.2;
+    Pintelon and Schoukens (2001), section 2.6.
 
-    ``quantity``, ``remove_drift``, ``threads`` and the Dataset as for `mfrf`. ``condition``
+    ``quantity``, ``remove_drift``, ``threads`` and the Dataset are those of `mfrf`. ``condition``
     is that of U.
 
-    Bias: none from noise as the number of realizations of R grows, also in closed loop. For
-    a nonlinear robot it tends to the quotient of two best linear approximations, which is
-    not the best linear approximation of the quotient. With few experiments as `mfrf`.
+    Bias: the bias from noise vanishes as the number of realizations of R grows, also in closed loop.
+    With few experiments it is that of `mfrf`. For a nonlinear robot the estimate tends to the quotient
+    of two best linear approximations, which is not the best linear approximation of the quotient.
 
-    Raises InputError where the reference is missing or has not one channel per input, and for
+    Raises InputError if the reference is missing or does not have one channel per input, and for
     fewer experiments than inputs.
     """
     expect_options(records, quantity, remove_drift, threads)

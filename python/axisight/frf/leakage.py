@@ -1,7 +1,7 @@
-"""What sensor noise leaves in a loop at the ends of a record.
+"""Leakage of sensor noise in a loop.
 
-Noise keeps the plant moving, so a record does not end in the state it began with. For a plant
-that integrates this weighs more, at low frequency, than the noise itself.
+Noise keeps the plant moving, so a record does not end in the state in which it began. For a plant
+that integrates, this leakage exceeds the noise itself at low frequency.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ Real = NDArray[np.float64]
 def noise_leakage_power(robot: Robot, frequency_hz: Real, n_samples: int) -> Real:
     """Return ``E|L|^2`` [rad^2] of the leakage ``L`` in ``Y = G U + V + L``, (n_freq, n_axes).
 
-    With the sampled plant ``x+ = A x + B u``, ``y = C x``, over a record of N samples
-    ``L = z C (z I - A)^-1 (x_0 - x_N)``, z = exp(i w T). Both ends scatter with the covariance
-    that white sensor noise maintains in the closed loop (a Lyapunov equation); what the loop
-    remembers over N = ``n_samples`` is taken into account.
+    With the sampled plant ``x+ = A x + B u``, ``y = C x``, a record of N = ``n_samples`` samples has
+    ``L = z C (z I - A)^-1 (x_0 - x_N)``, z = exp(i w T). Both states scatter with the covariance of
+    the closed loop under white sensor noise, from a Lyapunov equation. The correlation between them
+    over N samples is included. ``frequency_hz`` [Hz] is (n_freq,).
     Raises InputError for another controller than ``pi_velocity`` or ``p_velocity``.
     """
     kp, ki = velocity_gains(robot)
@@ -33,7 +33,7 @@ def noise_leakage_power(robot: Robot, frequency_hz: Real, n_samples: int) -> Rea
     a, b, c = _sampled(robot)
     n, m = b.shape
     now, before = np.diag(kp / step + ki), np.diag(kp / step)
-    # State and last measurement under u = -now (C x + e) + before (last measurement).
+    # State: plant and last measurement, under u = -now (C x + e) + before (last measurement).
     loop = np.block([[a - b @ now @ c, b @ before], [c, np.zeros((m, m))]])
     drive = np.vstack([-b @ now, np.eye(m)])
     covariance = solve_discrete_lyapunov(loop, std**2 * drive @ drive.T)

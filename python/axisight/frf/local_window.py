@@ -1,4 +1,4 @@
-"""What the local methods share: whole records, lines, the width of the window."""
+"""Shared by the local methods: joined records, lines, and the width of the window."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ Lines = Sequence[int] | NDArray[np.int64]
 HIGHEST_ORDER = 8
 
 DEGREES_OF_FREEDOM = 12
-"""Least number that a default window leaves: the disc that holds 95 % for a known variance
-then still holds ``1 - (1 - ln(0.05) / 12) ** -12`` = 93 % for the estimated one."""
+"""Least degrees of freedom that a default window leaves. The 95 % disc for a known variance then holds
+``1 - (1 - ln(0.05) / 12) ** -12`` = 93 % for the estimated one."""
 
 
 @dataclass(frozen=True)
 class Whole:
-    """Records with their periods joined, and the lines wanted."""
+    """Records with joined periods, and the lines to estimate."""
 
     input: NDArray[np.float64]
     output: NDArray[np.float64]
@@ -42,7 +42,7 @@ class Whole:
 
     @property
     def bins(self) -> NDArray[np.int64]:
-        """Lines of the whole record."""
+        """The lines to estimate, counted in lines of the whole record."""
         return self.lines * self.n_periods
 
     @property
@@ -59,7 +59,7 @@ def whole(
     remove_drift: bool,
     threads: int,
 ) -> Whole:
-    """Join the periods of the records and check the lines (None: all, or all excited)."""
+    """Return the records with joined periods and checked lines (None: all, or all excited)."""
     instance("records", records, PeriodicRecords, ArbitraryRecords)
     output_unit(records, quantity)
     switch("remove_drift", remove_drift)
@@ -97,7 +97,7 @@ def regression(
     half_width: int | None,
     threads: int,
 ) -> xr.Dataset:
-    """Estimate by local regression over all lines of the record."""
+    """Return the estimate by local regression over all lines of the record."""
     if half_width is None:
         half_width = _half_width(records, data, order, denominator_order)
     half_width = whole_number("half_width", half_width, 1)
@@ -122,7 +122,7 @@ def dataset(
     estimator: str,
     attrs: dict[str, int],
 ) -> xr.Dataset:
-    """Return the response of the core as every estimator does."""
+    """Return the estimate of the core as the Dataset of `frequency_response`."""
     provenance = {
         **attrs,
         "quantity": data.quantity,
@@ -147,7 +147,7 @@ def dataset(
 
 
 def _half_width(records: Records, data: Whole, order: int, denominator_order: int) -> int:
-    """Smallest half-width with enough degrees of freedom, counted on excited lines only."""
+    """Return the smallest half-width with enough degrees of freedom, counted on excited lines only."""
     experiments, inputs = records.n_experiments, records.n_inputs
     unknowns = (order + 1) * (inputs + experiments) + denominator_order
     if not isinstance(records, PeriodicRecords):
@@ -165,7 +165,7 @@ def _half_width(records: Records, data: Whole, order: int, denominator_order: in
 
 
 def _band(records: Records, data: Whole, half_width: int) -> tuple[int, int]:
-    """Lines that windows may cover: the excited ones, widened where a window needs more."""
+    """Return the range of lines that windows may cover: the excited lines, or more if a window needs it."""
     if not isinstance(records, PeriodicRecords):
         return 1, data.last_bin
     first, last = (int(records.lines[i]) * data.n_periods for i in (0, -1))

@@ -23,23 +23,22 @@ def logarithmic_mean(
     remove_drift: bool = True,
     threads: int = 1,
 ) -> xr.Dataset:
-    """Average log|G| and the phase over realizations, Wernholt (2004), (7.8) to (7.10).
+    """Return the mean of log|G| and of the phase over realizations, Wernholt (2004), (7.8) to (7.10).
 
     phase
-        "angle" is the mean of the angles (7.10), each counted from the direction of the mean
-        of the unit phasors, so that angles about plus and minus 180 degrees are neighbours;
-        "arithmetic" is the phase of the arithmetic mean (7.7); "cross_spectrum" that of the
-        mean of ``Y conj(U)`` (7.9), which weighs every realization with the power of its input:
-        for one input only, and from PeriodicRecords.
+        "angle" is the mean of the angles (7.10), each counted from the direction of the mean of the
+        unit phasors, so that angles near plus and minus 180 degrees average correctly. "arithmetic" is
+        the phase of the arithmetic mean (7.7). "cross_spectrum" is the phase of the mean of
+        ``Y conj(U)`` (7.9), which weights every realization with the power of its input; it needs
+        PeriodicRecords of one input.
     data, quantity, remove_drift, threads
-        As for `arithmetic_mean`; Dataset, variances and errors too. The variance is that of
-        the mean of log G, times |G|^2.
+        As for `arithmetic_mean`, like Dataset, variances and errors. The variance is that of the mean
+        of log G, times |G|^2.
 
-    Bias: exact without noise and distortion. Less ruled by outliers of a small U than the
-    arithmetic mean; inconsistent all the same: where the error is as large as G itself
-    (elements off the diagonal at low frequency, notches) log|G| is too large and stays so
-    with any number of realizations. An element that is exactly zero in one realization is
-    zero.
+    Bias: exact without noise and distortion. Outliers from a small U have less influence than on the
+    arithmetic mean. The mean is still inconsistent: if the error is as large as G (elements off the
+    diagonal at low frequency, notches), log|G| is too large for any number of realizations. An
+    element that is exactly zero in one realization is zero.
     """
     one_of("phase", phase, ("angle", "arithmetic", "cross_spectrum"))
     found = stack(data, quantity, remove_drift, threads)
@@ -74,7 +73,7 @@ def _crossed(
     remove_drift: bool,
     threads: int,
 ) -> Complex:
-    """Sum of ``Y conj(U)`` over the usable realizations, (n_freq, n_out, 1), periods averaged."""
+    """Return the sum of ``Y conj(U)`` over usable realizations, (n_freq, n_out, 1), periods averaged."""
     sets = [data] if isinstance(data, PeriodicRecords | xr.Dataset) else list(data)
     parts = []
     for records in sets:

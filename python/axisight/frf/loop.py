@@ -30,7 +30,7 @@ class Loop:
     controller
         F, from position error to torque [Nm/rad], (n_freq, n, n).
     prefilter
-        P, from the velocity reference [rad/s] to the position reference it amounts to,
+        P, from the velocity reference [rad/s] to the equivalent position reference [rad],
         (n_freq, n, n).
     """
 
@@ -43,8 +43,10 @@ class Loop:
 def robot_loop(robot: Robot, frequency_hz: Real, effects: Iterable[Effect] = ()) -> Loop:
     """Return the loop of a robot with a ``pi_velocity`` or ``p_velocity`` controller.
 
-    With z = exp(i w T): ``F = kp (1 - 1/z) / T + ki`` and ``F P = kp + ki T / (z - 1)``, the
-    equations of the controller in :doc:`conventions`. Raises InputError for another kind.
+    ``frequency_hz`` [Hz] is (n_freq,), above zero and up to Nyquist. With z = exp(i w T),
+    ``F = kp (1 - 1/z) / T + ki`` and ``F P = kp + ki T / (z - 1)``, from the controller equations in
+    :doc:`conventions`. ``effects`` act as in :meth:`axisight.Robot.zoh_response`. Raises InputError for
+    another controller and other frequencies.
     """
     kp, ki = velocity_gains(robot)
     frequency_hz = frequencies_below_nyquist(robot, frequency_hz)
@@ -61,7 +63,7 @@ def robot_loop(robot: Robot, frequency_hz: Real, effects: Iterable[Effect] = ())
 
 
 def frequencies_below_nyquist(robot: Robot, frequency_hz: object) -> Real:
-    """Return frequencies [Hz], (n_freq,), above zero and up to the Nyquist frequency."""
+    """Return frequencies [Hz], (n_freq,); raises InputError unless above zero and up to Nyquist."""
     nyquist = 0.5 / robot.sample_time_s
     what = f"frequencies above 0 up to {nyquist:g} Hz (Nyquist)"
     found = reals("frequency_hz", frequency_hz, what, 1)

@@ -21,39 +21,38 @@ def mfrf(
     covariance: Literal["elements", "full"] = "elements",
     threads: int = 1,
 ) -> xr.Dataset:
-    """Estimate G = Y U^-1 on the excited lines, periods averaged first.
+    """Return G = Y U^-1 at the excited lines, from averaged periods.
 
     Columns of Y and U are experiments: Wernholt (2004), (3.52) and (3.53). With more
-    experiments than inputs U^-1 is the pseudo-inverse, that is least squares over all
-    experiments; it wants synchronized realizations no more than (3.52) does.
+    experiments than inputs U^-1 is the pseudo-inverse, that is, least squares over all
+    experiments. Realizations need not be synchronized.
 
     quantity
-        Response to the recorded output ("position") or its first or second derivative: the
-        spectrum times i w or (i w)^2.
+        Output of the response: the recorded output ("position"), or its first or second derivative,
+        with the spectrum times i w or (i w)^2.
     remove_drift
-        Remove from each output of each experiment the linear drift that the means of its
-        periods show (one period shows none).
+        Remove from each output of each experiment the linear drift of the means of its periods
+        (a single period has no measurable drift).
     covariance
         "full" adds ``covariance`` (frequency_hz, element, element_2), complex and Hermitian:
         ``E dG_a conj(dG_b)`` of the elements (output, input), counted as in
         ``response.reshape(n_freq, -1)`` and named "output,input". Its diagonal is
-        ``variance``. ``noise_covariance`` is the same for ``noise_variance``, with several
-        periods. Of full rank only with at least n_out degrees of freedom: n_out + 1 periods,
-        or n_out more experiments than inputs.
+        ``variance``. With several periods, ``noise_covariance`` is the same for ``noise_variance``.
+        Both have full rank only with at least n_out degrees of freedom: n_out + 1 periods, or n_out
+        more experiments than inputs.
     threads
-        Threads for the transforms, 0 for every core; the result does not depend on it.
+        Number of threads for the transforms, 0 for every core; the result does not depend on it.
 
     Returns the Dataset of `axisight.frf.frequency_response` with ``degrees_of_freedom``.
     ``noise_variance`` comes from the scatter of the periods, through
-    vec(dG) = (U^-T kron I) vec(dY - G dU). ``variance`` is the same with as many experiments
-    as inputs: nonlinear distortion repeats with the period and is then invisible. With more
-    experiments ``variance`` comes from what they leave of Y - G U and holds both. One period
-    and as many experiments as inputs: NaN.
+    vec(dG) = (U^-T kron I) vec(dY - G dU). With as many experiments as inputs, ``variance`` equals
+    it: nonlinear distortion repeats with the period and is then invisible. With more experiments,
+    ``variance`` comes from the residuals Y - G U and includes noise and distortion. With one period
+    and as many experiments as inputs it is NaN.
 
-    Bias: exact without noise and distortion. In closed loop, noise that the controller feeds
-    back correlates with U: to second order G is pulled towards minus the inverse of the
-    controller, by about the noise-to-signal power ratio of U; averaging periods divides that
-    ratio by their number.
+    Bias: exact without noise and distortion. In closed loop, noise that the controller feeds back
+    correlates with U. To second order it pulls G towards minus the inverse of the controller, by
+    about the noise-to-signal power ratio of U. Averaging divides that ratio by the number of periods.
 
     Raises InputError for fewer experiments than inputs.
     """

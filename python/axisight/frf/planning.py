@@ -1,7 +1,7 @@
 """Errors predicted from a model before an experiment, to choose its design.
 
-Ripple repeats with the motion, so it is the same in every period and every repetition: only
-simulating the motion predicts it. Sensor noise is added by its variance, with what it leaks.
+Ripple repeats with the motion, so it is the same in every period and every repetition. Only a
+simulation of the motion predicts it. Sensor noise enters by its variance, including its leakage.
 """
 
 from __future__ import annotations
@@ -49,31 +49,36 @@ def predict_errors(
     model: Model = "linear",
     threads: int = 0,
 ) -> xr.Dataset:
-    """Return the errors to expect of ``Y U^-1`` under a design, from torque to acceleration.
+    """Return the expected errors of ``Y U^-1`` under a design, from torque to acceleration.
 
     Parameters
     ----------
     robot : with a ``pi_velocity`` or ``p_velocity`` controller and its sensor noise.
     references_rad_s : one period of motor velocity references, of one or more realizations:
-        (n_realizations, n_experiments, n_samples, n_axes), n_experiments = n_axes. Square
-        wave, amplitude and directions T are all in it.
+        (n_realizations, n_experiments, n_samples, n_axes) [rad/s], with n_experiments = n_axes.
+        They include square wave, amplitude and directions T.
     lines : excited lines k; frequencies ``k / (N T)``.
-    effects : what disturbs: ``torque_ripple`` and ``resolver_ripple``.
-    waiting_periods : simulated before the one that counts. A transient still left then is
-        part of the error, as it would be in the experiment.
+    effects : the disturbances: ``torque_ripple`` and ``resolver_ripple``.
+    waiting_periods : periods simulated before the evaluated one. A transient that remains is
+        part of the error, as in the experiment.
     n_periods : measured periods; they average the noise, not the ripple.
     model, threads : as in :func:`axisight.simulate_batch`.
 
     Returns
     -------
-    Dataset with dims (frequency_hz, output, input): complex ``response`` (the true one) and
-    ``bias`` (mean error over realizations), ``realization_variance`` (their scatter; NaN for
-    one), ``noise_variance`` (of one realization), ``relative_error`` (root mean square of
-    the error of one realization over ``|G|``), and with (frequency_hz, axis, experiment)
-    the median over realizations of ``input_snr``, (8.10), NaN without ripple, and
-    ``output_snr``, (8.11), noise included. See :func:`averaged_relative_error` for more realizations.
+    A Dataset. Over (frequency_hz, output, input):
 
-    Raises InputError for shapes that do not fit, lines out of range, and a run that fails.
+    - ``response``: the true response, complex
+    - ``bias``: mean error over realizations, complex
+    - ``realization_variance``: scatter of the error over realizations, NaN for a single one
+    - ``noise_variance``: variance by noise of one realization
+    - ``relative_error``: rms error of one realization over ``|G|``
+
+    Over (frequency_hz, axis, experiment), as medians over realizations: ``input_snr``, (8.10), NaN
+    without ripple, and ``output_snr``, (8.11), with noise. See :func:`averaged_relative_error` for
+    several realizations.
+
+    Raises InputError for shapes that do not fit, lines out of range, and a simulation that fails.
 
     """
     velocity_gains(robot)
@@ -108,9 +113,10 @@ def predict_errors(
 def averaged_relative_error(prediction: xr.Dataset, n_realizations: int) -> xr.DataArray:
     """Return the root mean square relative error after averaging over realizations.
 
-    ``sqrt(|bias|^2 + (realization + noise variance) / M) / |G|`` for the arithmetic mean of M
-    estimates, (7.7). The bias predicted from a few realizations holds their own scatter; its
-    expected share is taken off. Raises InputError if the prediction rests on one.
+    It is ``sqrt(|bias|^2 + (realization + noise variance) / M) / |G|`` for the arithmetic mean of
+    M = ``n_realizations`` estimates, (7.7). The bias in ``prediction`` includes the scatter of its few
+    realizations; the expected share of that scatter is subtracted. Raises InputError for a prediction
+    from one realization.
     """
     count = int(_predicted("prediction", prediction).attrs["n_realizations"])
     whole("n_realizations", n_realizations)
@@ -126,7 +132,8 @@ def averaged_relative_error(prediction: xr.Dataset, n_realizations: int) -> xr.D
 def compare_designs(predictions: Mapping[str, xr.Dataset]) -> pd.DataFrame:
     """Return the mean over frequency of the predicted relative error, one row per design.
 
-    Columns: ``design``, ``1,1`` ... (output, input) and ``mean`` over all elements.
+    Columns: ``design``, ``1,1`` ... (output, input) and ``mean`` over all elements. Raises InputError
+    unless ``predictions`` maps names to Datasets of :func:`predict_errors`.
     """
     rows = []
     if not isinstance(predictions, Mapping):
@@ -145,7 +152,7 @@ def compare_designs(predictions: Mapping[str, xr.Dataset]) -> pd.DataFrame:
 
 
 def _predicted(field: str, value: object) -> xr.Dataset:
-    """Return what :func:`predict_errors` gave; raises InputError for anything else."""
+    """Return ``value`` if it is a Dataset of :func:`predict_errors`; raises InputError for others."""
     needed = {"response", "bias", "realization_variance", "noise_variance", "relative_error"}
     if (
         not isinstance(value, xr.Dataset)

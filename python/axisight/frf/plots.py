@@ -23,13 +23,13 @@ from axisight.palette import SERIES
 Real = NDArray[np.float64]
 
 _WIDEST_IN = 100
-_DENSE = 60  # more lines than this are drawn as a curve, fewer with dots; half of it if small
+_DENSE = 60  # dots of more lines than this would overlap; half of it in small panels
 Responses = xr.Dataset | Mapping[str, xr.Dataset]
 
 
 @dataclass(frozen=True)
 class _Curve:
-    """One element ready to draw: dB and degrees, with bands; NaN where unknown."""
+    """One element to draw, in dB and degrees, with bands; NaN where unknown."""
 
     frequency_hz: Real
     db: Real
@@ -47,10 +47,10 @@ def plot_bode(
     unwrap: bool = False,
     width_in: float = 5.0,
 ) -> Figure:
-    """Plot magnitude and phase of one element with 95 % bands; returns a Figure.
+    """Plot magnitude and phase of one element with 95 % bands, and return a Figure.
 
     responses
-        A Dataset of ``axisight.frf``, or several as {label: Dataset}, drawn over one another.
+        A Dataset of ``axisight.frf``, or several as {label: Dataset}, drawn in the same axes.
     output, input
         The element, from 1.
     unwrap
@@ -58,13 +58,13 @@ def plot_bode(
     width_in
         Width of the figure [inches].
 
-    Bands are those of :func:`axisight.frf.confidence_radius`, and left out where the variance is
-    unknown. The lower band ends where the disc of
-    95 % holds zero: the phase is then anything. Flagged lines are marked on the frequency axis:
-    with a triangle where the estimate is ill-conditioned, with a cross where there is none.
+    Bands are those of :func:`axisight.frf.confidence_radius`; there are none where the variance is
+    unknown. The lower band has no end where the 95 % disc holds zero, because the phase can then be
+    anything. Marks on the frequency axis show flagged lines: a triangle for an ill-conditioned
+    estimate, a cross for a line without an estimate.
 
-    Raises InputError for an element that is not there, responses of different units, and
-    Datasets that hold no response.
+    Raises InputError for an element that does not exist, responses of different units, and
+    Datasets without a response.
     """
     named = _named(responses)
     switch("unwrap", unwrap)
@@ -97,7 +97,7 @@ def plot_response_matrix(
     width_in: float = 7.2,
     row_height_in: float = 1.9,
 ) -> Figure:
-    """Plot all elements: rows are outputs, columns inputs, axes shared; returns a Figure.
+    """Plot all elements, outputs over rows and inputs over columns, and return a Figure.
 
     responses, unwrap
         As in :func:`plot_bode`.
@@ -107,7 +107,8 @@ def plot_response_matrix(
         Width of the figure and height of an output's row [inches]. The default fills the text
         width of a paper or a notebook; 3.5 is one column of two.
 
-    Raises InputError as :func:`plot_bode`, and for responses of different sizes.
+    All elements share their axes. Raises InputError as :func:`plot_bode` does, and for responses of
+    different sizes.
     """
     named = _named(responses)
     phase, unwrap = switch("phase", phase), switch("unwrap", unwrap)
@@ -219,11 +220,11 @@ def _draw(top: Axes, bottom: Axes | None, curves: list[_Curve], *, thin: bool = 
         marker, size = ("o" if len(f) <= dense else ""), (2.0 if thin else 3.0)
         top.plot(f, curve.db, style, color=color, lw=width, marker=marker, ms=size)
         low, high = curve.db_band
-        # A disc that holds zero has no lower end in dB: the band runs to the edge of the axes.
+        # A disc that holds zero has no lower end in dB, so its band runs to the edge of the axes.
         floor = np.where(np.isneginf(low), -1e4, low)
         top.fill_between(f, floor, high, color=color, alpha=0.25, lw=0)
         if bottom is not None:
-            # No vertical strokes where the phase wraps: line and band are broken there.
+            # Line and band break where the phase wraps, because vertical strokes would mislead.
             jump = np.flatnonzero(np.abs(np.diff(curve.phase)) > 180) + 1
             x, half = np.insert(f, jump, f[jump - 1]), np.insert(curve.phase_band, jump, np.nan)
             y = np.insert(curve.phase, jump, np.nan)
@@ -271,7 +272,7 @@ def _share(
     parts: int,
     unwrap: bool,
 ) -> None:
-    """One frequency axis for all, one dB range for all, one phase range for all."""
+    """Give all panels the same frequency axis, dB range and phase range."""
     everything = [c for curves in cells.values() for c in curves]
     low, high = _db_range(everything)
     for (i, j), _ in cells.items():
@@ -302,7 +303,7 @@ def _frequency_axis(axes: Axes, curves: list[_Curve]) -> None:
 
 
 def _db_range(curves: list[_Curve]) -> tuple[float, float]:
-    """What the estimates take; bands may be cut, or one bad line would flatten the rest."""
+    """Return the range of the estimates; bands do not count, as one wide band would flatten the rest."""
     values = np.concatenate([c.db for c in curves])
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     margin = max(0.06 * (high - low), 1.0)
@@ -331,7 +332,7 @@ def _style(axes: Axes) -> None:
 def _legend(
     figure: Figure, named: dict[str, xr.Dataset], curves: list[_Curve], size: float = 8
 ) -> None:
-    """Name the responses if there are several, and the marks if there are any."""
+    """Add a legend with the responses, if several, and with the marks, if any."""
     handles = [
         Line2D([], [], color=SERIES[k % len(SERIES)], ls=_STYLES[k // len(SERIES) % len(_STYLES)])
         for k in range(len(named))

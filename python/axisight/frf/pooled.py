@@ -1,11 +1,11 @@
 """Weights for lines whose variance comes from few realizations.
 
-A sample variance with nu complex degrees of freedom scatters; a weight 1 / variance scatters more.
-Weighing every line by its own makes a least-squares estimate vary nu / (nu - 2) times more than
-the weights claim, without bound from three realizations. So a line is weighed by what its
-neighbours say, and its own variance is kept for the covariance of the estimate. Where variances
-of lines are independent, so are both, and this covariance is right however badly neighbours
-resemble each other. Variances that share data (of smoothed responses, local models) are not.
+A sample variance with nu complex degrees of freedom scatters, and a weight 1 / variance scatters more.
+If every line is weighted by its own variance, a least-squares estimate varies nu / (nu - 2) times more
+than the weights claim, without bound for three realizations. Therefore the neighbours of a line set
+its weight, and its own variance only enters the covariance of the estimate. If the variances of lines
+are independent, weight and own variance are too, and this covariance is right even if neighbours
+differ. Variances that share data (of smoothed responses or local models) are not independent.
 """
 
 from __future__ import annotations
@@ -21,36 +21,36 @@ from axisight.errors import InputError
 Real = NDArray[np.float64]
 
 ENOUGH_FREEDOM = 30.0
-"""Complex degrees of freedom that weights should rest on: they then cost 1/30 of variance."""
+"""Complex degrees of freedom that weights should have; they then cost 1/30 of the variance."""
 IMPROBABLE = 1e-6
-"""A line so far above its neighbours, by chance, keeps its own variance: it is disturbed.
+"""A line whose variance has this probability by chance, or less, is disturbed and keeps its own variance.
 
-Rarer than what counts as chance elsewhere: where neighbours resemble each other badly, choosing
-by the own variance would leave the smaller ones, and too small standard errors."""
+The probability is lower than elsewhere. If neighbours differ, choosing by the own variance would keep
+the smaller variances and make standard errors too small."""
 FEWEST_NEIGHBOURS = 4
-"""A straight line needs that many."""
+"""Fewest neighbours that determine a straight line well."""
 LARGEST_SHARE = 3
-"""One in so many lines at most counts as a neighbour."""
+"""At most one line in this many counts as a neighbour."""
 FEW_FREEDOM = 10.0
-"""Degrees of freedom beyond the elements weighed together: with fewer, `OwnWeights` is uncertain."""
+"""Degrees of freedom beyond the jointly weighted elements; with fewer, `OwnWeights` is uncertain."""
 MISFIT_EXPLAINED = 1.1
-"""Residuals larger than the variance explains by this factor: the model is incomplete."""
+"""The model is incomplete if residuals exceed what the variance explains by this factor."""
 
 
 def neighbours_for(
     degrees_of_freedom: float | None, n_lines: int, wanted: int | None = None
 ) -> int:
-    """Return how many neighbours say the weight of a line, 0 if it is its own variance.
+    """Return the number of neighbours that set the weight of a line, 0 for its own variance.
 
     degrees_of_freedom
-        Complex, of a line's variance; None if it is known.
+        Complex degrees of freedom of a line's variance; None if the variance is known.
     n_lines
-        That there are.
+        Number of lines.
     wanted
-        By the user: 0 or an even number from 4. None: as many as make 30 degrees of freedom, at
-        most a third of the lines, none for a known variance or one of 30.
+        The user's choice: 0 or an even number from 4. None: enough for 30 degrees of freedom
+        together, at most a third of the lines; 0 if the variance is known or has 30 itself.
 
-    Raises InputError for another number, and one that cannot be had.
+    Raises InputError for another number, and for more neighbours than there are lines.
     """
     if wanted is not None:
         check_neighbours(wanted)
@@ -66,7 +66,7 @@ def neighbours_for(
 
 
 def check_neighbours(wanted: int | None) -> None:
-    """Refuse a number of neighbours that is none."""
+    """Raise InputError unless ``wanted`` is None, 0 or an even number from 4."""
     if wanted is None:
         return
     whole = isinstance(wanted, int | np.integer) and not isinstance(wanted, bool)
@@ -79,10 +79,10 @@ def check_neighbours(wanted: int | None) -> None:
 
 @dataclass(frozen=True)
 class OwnWeights:
-    """What weights from a line's own estimated variance do to a fit.
+    """Corrections to a fit whose lines are weighted by their own estimated variances.
 
-    ``misfit``: mean square of whitened residuals. ``variance``: factor on the covariance of the
-    parameters that the weights claim. NaN where they have no bound; both are uncertain if ``few``.
+    ``misfit`` is the mean square of whitened residuals, and ``variance`` the factor on the nominal
+    covariance of the parameters. They are NaN without a bound, and uncertain if ``few``.
     """
 
     misfit: float = 1.0
@@ -91,9 +91,9 @@ class OwnWeights:
 
     @classmethod
     def of(cls, degrees_of_freedom: float | None, elements: int = 1) -> OwnWeights:
-        """Return the moments of an inverse complex Wishart matrix of so many ``elements``.
+        """Return the corrections, which are moments of an inverse complex Wishart matrix.
 
-        ``degrees_of_freedom`` nu: nu / (nu - p) and nu^2 / ((nu - p)^2 - 1).
+        With p ``elements`` and nu ``degrees_of_freedom``: nu / (nu - p) and nu^2 / ((nu - p)^2 - 1).
         """
         if degrees_of_freedom is None:
             return cls()
@@ -106,7 +106,7 @@ class OwnWeights:
 
 
 def few_words(degrees_of_freedom: float) -> str:
-    """Return what to say of lines weighed by their own variance of few degrees of freedom."""
+    """Return a warning for lines weighted by their own variance with few degrees of freedom."""
     return (
         f"lines are weighed by their own variance of {degrees_of_freedom:.3g} degrees of freedom: "
         "use neighbours=None if it is 0, more lines, or more realizations"
@@ -116,24 +116,23 @@ def few_words(degrees_of_freedom: float) -> str:
 def pooled_variance(
     magnitude: Real, variance: Real, degrees_of_freedom: float, neighbours: int
 ) -> Real:
-    """Return variances to weigh lines by, from their neighbours, (n_lines, ...) as ``variance``.
+    """Return variances for weights, each from the neighbours of its line, shaped as ``variance``.
 
     magnitude
-        Of the response, as a model has it: weights by a measured magnitude follow its error.
+        Magnitude of the response, preferably from a model, because weights from a measured magnitude
+        follow its error.
     variance
-        Over lines in ascending order first. One that is infinite or not a number takes no part
-        and stays.
+        (n_lines, ...), lines ascending. Values that are infinite or NaN take no part and stay.
     degrees_of_freedom
-        Complex, of each variance.
+        Complex degrees of freedom of each variance, above zero.
     neighbours
-        How many lines to take, half of them on either side; at the ends of the band the
-        nearest so many.
+        Number of neighbours, half of them on either side, or the nearest ones at the ends of the band;
+        `neighbours_for` gives it and checks it.
 
-    A straight line goes through the logarithms of the neighbours' variances, relative to the
-    magnitude where that makes them smoother. The logarithm of a sample variance is low by
-    ln nu - psi(nu), which is put right. A line above its neighbours by more than
-    the 1 - 1e-6 quantile of F(2 nu, 2 x 30) keeps its own variance. ``degrees_of_freedom`` above
-    zero and ``neighbours`` as from `neighbours_for`, which checks.
+    The pooled variance is a straight-line fit to the logarithms of the neighbours' variances, relative
+    to the magnitude if that makes them smoother. The fit corrects the bias ln nu - psi(nu) of the
+    logarithm of a sample variance. A line above its neighbours by more than the 1 - 1e-6 quantile of
+    F(2 nu, 2 x 30) keeps its own variance.
     """
     shape = variance.shape
     own = variance.reshape(shape[0], -1)
@@ -153,14 +152,14 @@ def pooled_variance(
 
 
 def _roughness(logs: Real, usable: NDArray[np.bool_]) -> Real:
-    """Mean square step from line to line, of every element."""
+    """Return the mean square step from line to line, for every element."""
     both = usable[1:] & usable[:-1]
     steps = np.where(both, np.diff(logs, axis=0), 0.0)
     return np.asarray(np.sum(steps**2, axis=0) / np.maximum(both.sum(axis=0), 1))
 
 
 def _line_through_neighbours(logs: Real, usable: NDArray[np.bool_], neighbours: int) -> Real:
-    """Straight lines fitted to the neighbours, at every line, itself left out; NaN without three."""
+    """Return straight-line fits to the neighbours of every line, without the line; NaN with fewer than 3."""
     n = len(logs)
     first = np.clip(np.arange(n) - neighbours // 2, 0, n - neighbours - 1)
     places = first[:, None] + np.arange(neighbours + 1)

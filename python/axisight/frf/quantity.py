@@ -1,4 +1,4 @@
-"""What the output of a frequency response is: a position, a velocity or an acceleration."""
+"""The output of a frequency response: a position, a velocity or an acceleration."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ _OUTPUTS: dict[str, Quantity] = {
 
 
 def quantity_of(response: xr.Dataset, quantity: str | None = None) -> Quantity:
-    """Return what the output of ``response`` is.
+    """Return the quantity of the output of ``response``: position, velocity or acceleration.
 
     response
-        Dataset as `axisight.frf.frequency_response` returns.
+        Dataset of `axisight.frf.frequency_response`.
     quantity
-        What the caller knows; goes before all else.
+        The quantity, if the caller knows it; it has priority.
 
-    Else the unit of the response tells, ``rad``, ``rad/s`` or ``rad/s^2`` (or m) over that of the
-    input, or the attribute ``quantity`` of the Dataset. Raises InputError where both are silent
-    or contradict each other, and for another ``quantity``.
+    Otherwise the unit of the response decides, ``rad``, ``rad/s`` or ``rad/s^2`` (or m) over the unit
+    of the input, or else the attribute ``quantity`` of the Dataset. Raises InputError if neither
+    decides, if both contradict each other, and for another ``quantity``.
     """
     if quantity is not None:
         return _known("quantity", quantity)

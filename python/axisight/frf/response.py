@@ -1,4 +1,4 @@
-"""What every estimator returns: a frequency response with its uncertainty.
+"""The Dataset that every estimator returns: a frequency response with its uncertainty.
 
 An ``xarray.Dataset`` over ``frequency_hz``, ``output`` and ``input`` (axes count from 1):
 
@@ -19,9 +19,9 @@ degrees_of_freedom frequency_hz, output, input   complex, of ``variance``; optio
 
 With a circular complex normal error the band of probability p about G is a disc of radius
 ``sqrt(-ln(1 - p) * variance)``; for 95 % that is ``1.73 sqrt(variance)``. With few degrees of
-freedom it is wider: :func:`axisight.frf.confidence_radius`.
+freedom the disc is wider, see :func:`axisight.frf.confidence_radius`.
 
-A line that cannot be estimated is NaN and flagged; a number is never infinite.
+A line that cannot be estimated is NaN and flagged; a response is never infinite.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ DIMS = ("frequency_hz", "output", "input")
 
 
 class Flag(IntEnum):
-    """Why a line is not to be trusted."""
+    """Quality of an estimate at a line, and the reason if it cannot be trusted."""
 
     GOOD = 0
     RANK_DEFICIENT = 1
@@ -68,27 +68,28 @@ def frequency_response(
     output_unit: str = "rad",
     attrs: dict[str, Any] | None = None,
 ) -> xr.Dataset:
-    """Return the Dataset described above from arrays of shape (n_freq, n_out, n_in).
+    """Return the Dataset of an estimate, as described in this module, from its arrays.
 
     frequency_hz
         Frequencies [Hz], (n_freq,), ascending.
     response
-        G, complex; ``variance`` and ``noise_variance`` are real, of the same shape.
+        G, complex, (n_freq, n_out, n_in); ``variance`` and ``noise_variance`` are real, of the same
+        shape.
     estimator
-        Its name, for the attributes.
+        Name of the estimator, for the attributes.
     input_unit, output_unit
         Units of the channels, for labels.
     condition, flag, coherence
         (n_freq,), (n_freq,) and (n_freq, n_out).
     degrees_of_freedom
-        Complex, of ``variance``, of its shape.
+        Complex degrees of freedom of ``variance``, of the same shape.
     attrs
         More provenance, e.g. numbers of experiments and periods.
 
-    A line where any element is not finite becomes NaN throughout, and is flagged. An infinite
-    variance says that nothing is known of an element: fits leave it out.
+    If any element of a line is not finite, the whole line becomes NaN and is flagged. An infinite
+    variance marks an element as unknown; fits leave it out.
 
-    Raises InputError for shapes that do not fit.
+    Raises InputError for shapes that do not fit, frequencies that do not ascend, and unknown flags.
     """
     frequency_hz = reals("frequency_hz", frequency_hz, "frequencies of shape (n_freq,)", 1)
     if np.any(np.diff(frequency_hz) <= 0):
@@ -124,7 +125,7 @@ def frequency_response(
     if not np.isin(flag, list(Flag)).all():
         raise InputError(f"flag: expected flags {', '.join(str(int(f)) for f in Flag)}")
     condition = np.where(np.isfinite(condition), condition, np.nan)
-    # A line without numbers is never good, whatever took them.
+    # A line without numbers is never good, for any reason.
     lost = ~known & np.isin(flag, (Flag.GOOD, Flag.ILL_CONDITIONED))
     flag = np.where(lost, Flag.RANK_DEFICIENT, flag).astype(np.int8)
     variables["condition"] = (DIMS[:1], condition, {"units": "1"})
@@ -156,7 +157,7 @@ def frequency_response(
 
 
 def estimate_of(field: str, value: object, *, uncertain: bool = True) -> xr.Dataset:
-    """Return a Dataset as described above; raises InputError for anything else.
+    """Return ``value`` if it is a Dataset of `frequency_response`; raises InputError for anything else.
 
     The variance may be absent unless ``uncertain``.
     """

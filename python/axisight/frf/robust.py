@@ -41,40 +41,40 @@ def robust_method(
     remove_drift: bool = True,
     threads: int = 1,
 ) -> xr.Dataset:
-    """Return the best linear approximation, with its noise and its distortion variance.
+    """Return the best linear approximation, with its noise variance and distortion variance.
 
     Sources: Pintelon and Schoukens (2012), section 4.3.1; D'haene, Pintelon, Schoukens and
     Van Gheem (2005), Variance analysis of frequency response function measurements using
     periodic excitations.
 
     records
-        M >= 2 realizations of ``n_inputs`` experiments in a row, equal in amplitude and
-        independent in phase, of P >= 2 periods each in steady state. A recorded reference
-        with as many channels as inputs is used: responses from it to input and output are
-        averaged and divided, which in closed loop is unbiased by noise at the input.
+        M >= 2 realizations of ``n_inputs`` consecutive experiments, equal in amplitude and
+        independent in phase, each of P >= 2 periods in steady state. If the records have a reference
+        with as many channels as inputs, the method averages the responses of input and output to it
+        and divides them. In closed loop this avoids bias from noise at the input.
     quantity, remove_drift, threads
         As for `mfrf`.
 
-    Scatter over the periods is noise; scatter over the realizations is noise and stochastic
-    nonlinear distortion together:
+    Scatter over the periods is noise. Scatter over the realizations is noise plus stochastic nonlinear
+    distortion:
 
-    - ``variance``: of the mean over realizations, from their scatter (M - 1 complex degrees
+    - ``variance``: that of the mean over realizations, from their scatter (M - 1 complex degrees
       of freedom). The exact band of probability p has radius
       ``sqrt(q ((1 - p) ** (-1 / q) - 1) variance)`` with q = M - 1.
-    - ``noise_variance``: the share of the noise, from the scatter over the periods
+    - ``noise_variance``: the part of it due to noise, from the scatter over the periods
       (M (P - 1) degrees of freedom).
     - ``distortion_variance`` (frequency_hz, output, input): stochastic nonlinear distortion
-      of a single realization, ``M (variance - noise_variance)``, zero where the difference
-      is below zero. It stays when more periods are measured.
+      of a single realization, ``M (variance - noise_variance)``, but not below zero. More periods do
+      not reduce it.
 
-    Bias: none towards the best linear approximation of the excitation's class, which itself
-    depends on amplitude and spectrum. Without reference, noise at the input biases as it
-    does the period-averaged MFRF. Transients are taken for noise: drop them first.
+    Bias: none with respect to the best linear approximation for the class of the excitation, which
+    depends on amplitude and spectrum. Without reference, noise at the input biases the estimate like
+    the period-averaged MFRF. Drop transients first, because the method takes them for noise.
 
-    ``condition`` is the largest over realizations of U with its rows scaled to norm one.
+    ``condition`` is the largest condition number of U over realizations, rows scaled to norm one.
 
-    Raises InputError for a single period or realization and for experiments that do not
-    make whole realizations.
+    Raises InputError for a single period or realization, and if the experiments do not form whole
+    realizations.
     """
     expect_options(records, quantity, remove_drift, threads)
     n, total = records.n_inputs, records.n_experiments
@@ -132,7 +132,7 @@ def _spectra(
 
 
 def by_realization(signal: Complex, n: int) -> Complex:
-    """Turn (line, channel, experiment, period) to the axes of :class:`Spectra`."""
+    """Return (line, channel, experiment, period) in the axis order of :class:`Spectra`."""
     lines, channels, experiments, periods = signal.shape
     parts = signal.reshape(lines, channels, experiments // n, n, periods)
     return np.ascontiguousarray(parts.transpose(2, 4, 0, 1, 3))
@@ -147,7 +147,7 @@ def excitation(signal: Complex) -> tuple[Real, NDArray[np.int8]]:
 
 
 def inverse(matrix: Complex, flag: NDArray[np.int8]) -> Complex:
-    """Invert over the last two axes; lines (third last axis) flagged unusable are NaN."""
+    """Return inverses over the last two axes, NaN at lines (third last axis) flagged unusable."""
     out, _ = invert(matrix)
     out[..., lost_lines(flag), :, :] = np.nan
     return out
@@ -161,7 +161,7 @@ def period_variance(error: Complex) -> Real:
 
 
 def _divide(data: Spectra, weight: Complex, flag: NDArray[np.int8]) -> tuple[Complex, Complex]:
-    """Return the response and the matrices that turn an error of Y into one of it."""
+    """Return the response, and the matrices that turn an error of Y into an error of the response."""
     from_reference = inverse((data.input.mean(axis=1) @ weight).mean(axis=0), flag)
     response = (data.output.mean(axis=1) @ weight).mean(axis=0) @ from_reference
     return response, weight @ from_reference

@@ -18,18 +18,18 @@ Real = NDArray[np.float64]
 
 
 def hann_weights(frequency_hz: Real, bandwidth_hz: float) -> csr_array:
-    """Weights alpha, (n_freq, n_freq), a row for each frequency smoothed at; each sums to one.
+    """Return weights alpha, (n_freq, n_freq), one row per smoothed line; each row sums to one.
 
-    A Hann window over frequency, zero ``bandwidth_hz`` away from the middle. At the ends of
-    the band it is kept symmetric by narrowing it, so that a straight line stays straight.
-    Raises InputError for a bandwidth that is not positive.
+    The weights are a Hann window over frequency that reaches zero at ``bandwidth_hz`` from its
+    middle. At the ends of the band the window is narrower and stays symmetric, so that a straight
+    line stays straight. Raises InputError for a bandwidth that is not positive.
     """
     bandwidth_hz = positive("bandwidth_hz", bandwidth_hz)
     frequency = np.asarray(frequency_hz, float)
     spacing = np.min(np.diff(frequency)) if len(frequency) > 1 else 1.0
-    # One spacing beyond the outermost line: there a single line is left.
+    # One spacing more than the distance to the end, so that the outermost line keeps itself.
     room = np.minimum(frequency - frequency[0], frequency[-1] - frequency) + spacing
-    # Far below the spacing a line stands alone, however narrow the window.
+    # A much narrower window also holds one line only, but would divide by nearly zero.
     width = np.minimum(max(bandwidth_hz, 1e-3 * spacing), room) * (1 - 1e-9)
     first = np.searchsorted(frequency, frequency - width, side="right")
     count = np.searchsorted(frequency, frequency + width, side="left") - first
@@ -42,18 +42,18 @@ def hann_weights(frequency_hz: Real, bandwidth_hz: float) -> csr_array:
 
 
 def smooth(dataset: xr.Dataset, bandwidth_hz: float, *, weight: Real | None = None) -> xr.Dataset:
-    """Smooth the response of ``dataset`` over its lines, Wernholt (2004), (3.46).
+    """Return ``dataset`` with its response smoothed over the lines, Wernholt (2004), (3.46).
 
         G(w) = sum_k alpha_k(w) G(w_k) / sum_k alpha_k(w)
 
-    with alpha a Hann window of half width ``bandwidth_hz``, times ``weight`` (n_freq,) where
-    given (for instance the power of the input). Lines that are NaN take no part and stay
-    NaN. Variances are those of the weighted mean of independent lines.
+    Here alpha is a Hann window of half width ``bandwidth_hz`` [Hz], times ``weight`` (n_freq,) if
+    given, for instance the power of the input. Lines that are NaN take no part and stay NaN.
+    Variances are those of the weighted mean of independent lines.
 
-    Bias: about h^2/6 (1 - 6/pi^2) of the second derivative of G over frequency with h the
-    half width: resonances are flattened and widened. Narrower than a resonance (3 dB) is safe.
+    Bias: about h^2/6 (1 - 6/pi^2) times the second derivative of G over frequency, with h the half
+    width. Smoothing flattens and widens resonances; a window narrower than a resonance (3 dB) is safe.
 
-    Raises InputError for a bandwidth that is not positive, a wrong or negative weight.
+    Raises InputError for a bandwidth that is not positive, and for a wrong or negative weight.
     """
     frequency = estimate_of("dataset", dataset)["frequency_hz"].values
     alpha = hann_weights(frequency, bandwidth_hz)
@@ -84,7 +84,7 @@ def smooth(dataset: xr.Dataset, bandwidth_hz: float, *, weight: Real | None = No
     flag[lost & (flag == Flag.GOOD)] = Flag.NO_EXCITATION
     out = dataset.assign(changed | {"flag": dataset["flag"].copy(data=flag)})
     if "degrees_of_freedom" in dataset:
-        # Independent lines in the window.
+        # Effective number of independent lines in each window.
         lines = 1 / np.asarray(alpha.power(2).sum(axis=1)).clip(1e-12)
         freedom = dataset["degrees_of_freedom"].values * lines[:, None, None]
         out = with_freedom(out, np.where(lost[:, None, None], np.nan, freedom))

@@ -1,4 +1,4 @@
-"""Spectral analysis: smoothed spectra of any data."""
+"""Spectral analysis with smoothed spectra, for periodic and other data."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from axisight.frf.smoothing import hann_weights
 from axisight.records.periodic import PeriodicRecords
 
 HANN_CORRELATION = (2 / 3, 1 / 6)
-"""Correlation of DFT lines one and two apart when white noise goes through a Hann taper."""
+"""Correlation of DFT lines one and two apart, for white noise with a Hann taper."""
 
 
 def spectral_analysis(
@@ -40,35 +40,34 @@ def spectral_analysis(
     remove_drift: bool = True,
     threads: int = 1,
 ) -> xr.Dataset:
-    """Estimate G = S_yu S_uu^-1 from spectra smoothed over neighbouring lines.
+    """Return G = S_yu S_uu^-1 from spectra smoothed over neighbouring lines.
 
-    Wernholt (2004), (3.47) to (3.49), with matrices for several inputs. Data need not be
-    periodic: a record of any kind is one period of one experiment, with all its lines taken
-    as excited,
+    Wernholt (2004), (3.47) to (3.49), with matrices for several inputs. Data need not be periodic.
+    Give any other record as one period of one experiment, with all lines excited:
 
         PeriodicRecords(T, u[None, None], y[None, None], np.arange(1, (len(u) + 1) // 2))
 
-    Periods and experiments, if there are more, are summed up; several inputs can be told
-    apart in a single experiment if they are independent over the bandwidth.
+    Spectra are summed over periods and experiments. A single experiment separates several inputs if
+    they are independent over the bandwidth.
 
     bandwidth_hz
-        Half width of the Hann window over frequency. More than n_inputs lines must lie in it.
+        Half width of the Hann window over frequency [Hz]. More than n_inputs lines must lie in it.
     taper
-        "hann" multiplies each period by a Hann window against leakage: for data that are not
-        periodic. Periodic data are exact without.
+        "hann" multiplies each period by a Hann window against leakage, for data that are not
+        periodic. Periodic data have no leakage and need none.
     quantity, remove_drift, threads
         As for `mfrf`.
 
     Returns the Dataset of `axisight.frf.frequency_response` with multiple ``coherence``.
-    ``variance`` is from what G leaves of the output spectrum: noise, distortion, leakage and
-    the curvature of G inside the window together. ``condition`` is the square root of that of
-    S_uu, inputs scaled to one.
+    ``variance`` comes from the part of the output spectrum that G does not explain: noise,
+    distortion, leakage and the curvature of G inside the window. ``condition`` is the square root of
+    the condition number of S_uu, with inputs scaled to one.
 
-    Bias: leakage for data that are not periodic, about 1/N; smoothing flattens resonances
-    as for `smooth`; in closed loop noise pulls G towards minus the inverse of the controller
-    (Wernholt (2004), section 3.7), whatever the length of the data. Exact for a constant G.
+    Bias: data that are not periodic leak, about 1/N. Smoothing flattens resonances, see `smooth`. In
+    closed loop, noise pulls G towards minus the inverse of the controller (Wernholt (2004),
+    section 3.7), for any length of the data. The estimate is exact for a constant G without noise.
 
-    Raises InputError for a bandwidth not positive or too narrow for the number of inputs.
+    Raises InputError for a bandwidth that is not positive or too narrow for the number of inputs.
     """
     expect_options(records, quantity, remove_drift, threads)
     one_of("taper", taper, ("none", "hann"))
@@ -118,7 +117,7 @@ def spectral_analysis(
 
 
 def _tapered(records: PeriodicRecords) -> PeriodicRecords:
-    """Each period without its mean and straight line, through a Hann window."""
+    """Return the records with each period detrended and multiplied by a Hann window."""
     n = np.arange(records.n_samples)
     window = (0.5 - 0.5 * np.cos(2 * np.pi * n / records.n_samples))[:, None]
     ramp = (n - n.mean())[:, None]
@@ -132,18 +131,18 @@ def _tapered(records: PeriodicRecords) -> PeriodicRecords:
 
 
 def _smoothed(alpha: csr_array, a: Complex, b: Complex) -> Complex:
-    """Cross spectra summed over records, then smoothed over lines."""
+    """Return cross spectra, summed over records, then smoothed over lines."""
     crossed = a @ b.conj().swapaxes(1, 2)
     out = np.asarray(alpha @ crossed.reshape(len(crossed), -1))
     return np.ascontiguousarray(out.reshape(crossed.shape))
 
 
 def _freedom(alpha: csr_array, lines: NDArray[np.int64], taper: str) -> Real:
-    """Independent lines under each window: 1 / sum_kl alpha_k alpha_l rho_kl^2."""
+    """Return the number of independent lines in each window, 1 / sum_kl alpha_k alpha_l rho_kl^2."""
     correlated = alpha
     if taper == "hann":
         for apart, value in enumerate(HANN_CORRELATION, start=1):
-            # Lines that are ``apart`` lines from each other, among those given.
+            # Pairs of given lines that lie ``apart`` lines from each other.
             low = np.flatnonzero(np.isin(lines + apart, lines))
             high = np.searchsorted(lines, lines[low] + apart)
             size = np.full(len(low), value**2)
@@ -153,7 +152,7 @@ def _freedom(alpha: csr_array, lines: NDArray[np.int64], taper: str) -> Real:
 
 
 def _condition(s_uu: Complex) -> tuple[Real, NDArray[np.int8]]:
-    """Square root of the condition of S_uu, inputs scaled to one, and flags."""
+    """Return the square root of the condition of S_uu, with inputs scaled to one, and flags."""
     power = np.einsum("kii->ki", s_uu).real
     silent = np.any(power <= SMALLEST**2 * power.max(axis=0), axis=1)
     scale = 1 / np.sqrt(np.where(power > 0, power, 1.0))

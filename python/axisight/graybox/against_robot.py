@@ -1,4 +1,4 @@
-"""Whether the fit of an axis can be that of a robot: wrong units and gear sides scale all of it."""
+"""Comparison of an axis fit with a robot file, which shows wrong units and gear sides."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from axisight.robot import Robot
 @summarized
 @dataclass(frozen=True)
 class Comparison:
-    """A fit against the values of a robot file.
+    """A comparison of a fit with the values of a robot file.
 
-    ``ratios``: fitted over the robot's value of the motor's inertia, the total inertia and the
-    gear stiffness. ``one_factor``: whether all are off alike by more than 3.5, which is what
-    units and gear sides do and no machine. ``findings``: in words.
+    ``ratios`` are fitted values over the robot's values, for the motor's inertia, the total inertia
+    and the gear stiffness. ``one_factor`` is true if all differ by one common factor above 3.5 or
+    below 1 / 3.5; wrong units or gear sides cause that, and no machine does. ``findings`` say it in
+    words.
     """
 
     ratios: dict[str, float]
@@ -31,18 +32,18 @@ class Comparison:
 
 
 def compare_with_robot(fit: AxisFit, robot: Robot, axis: int | str = 1) -> Comparison:
-    """Compare the fit of an axis with what the robot has there.
+    """Return a comparison of an axis fit with the robot's values for that axis.
 
     fit
-        Any number of masses.
+        A fit with any number of masses.
     robot
-        With a gear spring at the axis; its operating point counts.
+        A robot with a gear spring at the axis. The comparison uses its operating point.
     axis
         Number of the axis from 1, or the name of its joint.
 
-    Degrees instead of radians, torque in mNm or on the other side of the gear multiply inertias
-    and stiffness by one common factor, and the fit is as good as ever. Raises InputError for an
-    axis that is not there or has a rigid transmission.
+    Degrees instead of radians, torque in mNm, or torque on the other side of the gear multiply
+    inertias and stiffness by one common factor, and the fit does not get worse. Raises InputError for
+    an axis that does not exist or has a rigid transmission.
     """
     if not isinstance(fit, AxisFit):
         raise InputError(f"fit: expected an AxisFit, got {type(fit).__name__}")

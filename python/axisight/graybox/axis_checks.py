@@ -1,4 +1,4 @@
-"""What is wrong with records before an axis is fitted to them."""
+"""Checks of records before the fit of an axis."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from axisight.graybox.axis_model import AxisData, AxisModel
 
 Array = NDArray[np.float64]
 
-# Samples after the first from which the speed at the start is found.
+# Samples after the first that give the speed at the start.
 START_SAMPLES = 8
-# Standard errors and share of the root mean square speed beyond which a start is doubted, and
-# refused. White noise passes 5 standard errors in one record out of two million. Slow noise does
-# not show in differences of samples: against it a start is refused only at a share that noise
-# of a tenth of the motion reaches in three out of a thousand.
+# Limits of the speed at the start, as standard errors and as a share of the rms speed: above DOUBTED
+# a warning, above REFUSED an error. White noise exceeds 5 standard errors in one record out of two
+# million. Slow noise does not show in differences of samples, so the share protects against it: noise
+# of a tenth of the motion reaches the refused share in three records out of a thousand.
 DOUBTED = (5.0, 0.01)
 REFUSED = (8.0, 0.3)
 
 
 def check_data(model: AxisModel, data_sets: Sequence[AxisData] | AxisData) -> tuple[AxisData, ...]:
-    """Return the records, each with the output the model needs."""
+    """Return the records; raises InputError unless each has the output and length that the model needs."""
     data = (data_sets,) if isinstance(data_sets, AxisData) else tuple(data_sets)
     if not data:
         raise InputError("data_sets: expected at least one AxisData, got none")
@@ -32,7 +32,7 @@ def check_data(model: AxisModel, data_sets: Sequence[AxisData] | AxisData) -> tu
         if not isinstance(record, AxisData):
             raise InputError(f"data_sets[{i}]: expected AxisData, got {type(record).__name__}")
         record.measured(model)
-        # A difference needs one sample more than the speed at the start is found from.
+        # A difference needs one sample more than START_SAMPLES.
         least = max(4 * model.n_masses, START_SAMPLES + 1)
         if len(record) < least:
             raise InputError(
@@ -42,16 +42,16 @@ def check_data(model: AxisModel, data_sets: Sequence[AxisData] | AxisData) -> tu
 
 
 def label(i: int, record: AxisData) -> str:
-    """Name of a record."""
+    """Return the name of a record."""
     return record.name or f"data set {i + 1}"
 
 
 def check_energy(model: AxisModel, data: Sequence[AxisData]) -> None:
-    """Refuse records in which the motor takes out more energy than the axis can have had.
+    """Raise InputError for records in which the motor takes more energy out of the axis than it put in.
 
-    From rest, the work of the motor torque is kinetic and elastic energy and losses, never
-    negative. Where it is, torque and motion have opposite signs. Noise that is fed back to the
-    torque makes some negative work, so a tenth of the work turned over is let pass.
+    From rest, the work of the motor torque becomes kinetic energy, elastic energy and losses, so it is
+    never negative. If it is, torque and motion have opposite signs. Noise fed back to the torque does
+    some negative work, so a tenth of the total absolute work is allowed.
     """
     for i, record in enumerate(data):
         velocity = motion(model, record)
@@ -68,10 +68,10 @@ def check_energy(model: AxisModel, data: Sequence[AxisData]) -> None:
 def check_start(
     model: AxisModel, data: Sequence[AxisData], values: Mapping[str, float]
 ) -> tuple[str, ...]:
-    """Refuse records clearly in motion at their first sample that the model starts at rest.
+    """Return warnings for records that may be in motion at their first sample, if the model starts at rest.
 
-    Returns words for those that may be, if their noise is not slow. ``values`` are all
-    parameters, roughly right.
+    Raises InputError for records that clearly are. A warning assumes that the noise is not slow.
+    ``values`` are all parameters, roughly right.
     """
     out = []
     for i, record in enumerate(data if model.initial == "rest" else ()):
@@ -98,12 +98,12 @@ def _beyond(speed: float, error: float, size: float, limits: tuple[float, float]
 def initial_speed(
     model: AxisModel, record: AxisData, values: Mapping[str, float]
 ) -> tuple[float, float]:
-    """Return the motor speed at the first sample beyond a start at rest, and its standard error.
+    """Return the motor speed at the first sample [rad/s], and its standard error.
 
-    What the first samples have beyond a simulation from rest is a straight line in velocity (a
-    parabola in position), whose value at the first sample is the speed; the simulation takes out
-    jumps of the torque, the slope what its inertia misses. The noise is the larger of that
-    about the line and that from third differences of the record.
+    The first samples minus a simulation from rest follow a straight line in velocity (a parabola in
+    position), whose value at the first sample is the speed. The simulation removes jumps of the
+    torque, and the slope of the line absorbs errors of its inertia. The noise is the larger of the
+    scatter about the line and the estimate from third differences of the record.
     """
     n, step = START_SAMPLES, record.sample_time_s
     torque = np.asarray(record.torque_nm)[: n + 1]
@@ -115,7 +115,7 @@ def initial_speed(
     at, degree, place = np.arange(n, dtype=np.float64), 1, 0
     deviation = measured[:n] - simulated[:n]
     if model.output == "velocity_difference":
-        # The first difference is none: that of the second sample is the speed between both.
+        # The first sample has no difference; that of the second is the speed between both.
         at, deviation = at + 0.5, measured[1 : n + 1] - simulated[1 : n + 1]
     elif model.output == "position":
         degree, place = 2, 1
@@ -131,14 +131,14 @@ def initial_speed(
 def noise_std(measured: Array) -> float:
     """Return the standard deviation of white noise on a smooth signal, from third differences.
 
-    A third difference of white noise has 1 + 9 + 9 + 1 times its variance; the mean size of a
-    normal number is sqrt(2 / pi) standard deviations.
+    A third difference of white noise has 1 + 9 + 9 + 1 times the variance of the noise. The mean
+    absolute value of a normal number is sqrt(2 / pi) standard deviations.
     """
     return float(np.mean(np.abs(np.diff(measured, 3))) * np.sqrt(np.pi / 2 / 20))
 
 
 def motion(model: AxisModel, record: AxisData) -> Array:
-    """Motor velocity of a record [rad/s]."""
+    """Return the motor velocity of a record [rad/s]."""
     measured = record.measured(model)
     if model.output == "position":
         return np.gradient(measured, record.sample_time_s)
@@ -146,7 +146,7 @@ def motion(model: AxisModel, record: AxisData) -> Array:
 
 
 def reversals(velocity: Array) -> int:
-    """Count changes of direction between speeds above a tenth of the root mean square."""
+    """Return the number of changes of direction between speeds above a tenth of the rms."""
     size = float(np.sqrt(np.mean(velocity**2)))
     signs = np.sign(velocity[np.abs(velocity) > 0.1 * size])
     return int(np.count_nonzero(np.diff(signs)))
@@ -155,7 +155,7 @@ def reversals(velocity: Array) -> int:
 def data_warnings(
     model: AxisModel, data: Sequence[AxisData], free: Sequence[str]
 ) -> tuple[str, ...]:
-    """Return in words what these records cannot tell about the free parameters."""
+    """Return warnings about free parameters that these records do not show."""
     out = []
     turns = sum(reversals(motion(model, d)) for d in data)
     dry = [name for name in ("F_c", "u_0", "F_s") if name in free]

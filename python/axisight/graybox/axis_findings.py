@@ -1,4 +1,4 @@
-"""What the residuals of an axis fit say against it, in words."""
+"""Warnings about an axis fit from its residuals."""
 
 from __future__ import annotations
 
@@ -20,38 +20,38 @@ Array = NDArray[np.float64]
 
 # Fit (3.54) [%] below which the residuals have more than a quarter of the power of the motion.
 LOW_FIT = 50.0
-# Total inertias of start and end further apart than this are no matter of a poor start.
+# A poor start does not explain a larger ratio between the total inertias of start and end.
 FAR = 3.5
-# Factors by which a motion is off when its unit is not rad and rad/s.
+# Factors between motions in wrong units and in rad and rad/s.
 UNITS = {
     180 / np.pi: "degrees instead of radians",
     30 / np.pi: "revolutions per minute instead of rad/s",
     np.pi / 180: "a conversion from degrees where there were radians",
     1 / (2 * np.pi): "revolutions instead of radians",
 }
-# A start knows inertia and motion within this factor, or it says nothing about units.
+# A start shows wrong units only if it knows inertia and motion within this factor.
 NEAR = 2.0
-# Standard errors of the two kinds further apart than this are told.
+# A warning follows if the two kinds of standard errors differ by more than this factor.
 DISAGREE = 2.0
-# Variances of records further apart than this cost more than 6 % of the standard errors.
+# A larger ratio of the variances of records enlarges standard errors by more than 6 %.
 UNEQUAL = 2.0
-# Probability of a word by chance.
+# Probability of a warning by chance.
 CHANCE = 1e-3
 _LAG_S = 0.25
-# Departure of the rise of the loss from that of a parabola: an eighth of a standard error.
+# Relative departure of the rise of the loss from a parabola; it shifts an eighth of a standard error.
 BENT = 0.25
 
 
 def total_inertia(values: Mapping[str, float]) -> float:
-    """Inertia of all masses on the motor side [kg m^2]."""
+    """Return the inertia of all masses on the motor side [kg m^2]."""
     arms = sum(v for n, v in values.items() if n.startswith("J_a"))
     return values["J_m"] + values["r"] ** 2 * arms
 
 
 def motion_ratio(task: Task) -> float:
-    """Return how large the measured motion is against that simulated from the start.
+    """Return the ratio of measured motion to the motion simulated from the start.
 
-    By root mean square speeds, which do not ask for equal phase.
+    The ratio of rms speeds does not need equal phases.
     """
     measured, simulated = 0.0, 0.0
     for record in task.data:
@@ -63,7 +63,7 @@ def motion_ratio(task: Task) -> float:
 
 
 def scale_words(factor: float, ratio: float) -> str:
-    """Return what a motion too large by this common factor may be, in the words of units."""
+    """Return text on the units or gear sides that explain a motion too large by ``factor``."""
     named = dict(UNITS)
     if ratio != 1:
         named[ratio] = "the joint's side of the gear instead of the motor's"
@@ -86,12 +86,12 @@ def fit_findings(
     parameters: Mapping[str, float],
     fits: Sequence[float],
 ) -> list[str]:
-    """Return words about records that the simulation does not fit, and about factors of motion."""
+    """Return warnings about records that the simulation does not fit, and about wrong units."""
     low = []
     for i, (record, fit) in enumerate(zip(task.data, fits, strict=True)):
         measured = record.measured(task.model)
         rest = (1 - fit / 100) * float(np.std(measured))
-        # Noise of this size may hide a model that is right.
+        # Large noise gives a right model a low fit too, so only larger residuals count.
         if fit < LOW_FIT and rest > 2 * noise_std(measured):
             low.append(f"{label(i, record)} {fit:.1f} %")
     if low:
@@ -116,21 +116,21 @@ def fit_findings(
 
 
 def _autocorrelation(parts: Sequence[Array], lags: int) -> Array:
-    """Mean autocorrelation of all parts about zero, one at lag zero."""
+    """Return the mean autocorrelation of all parts about zero, one at lag zero."""
     total = pooled_autocovariance(parts, lags)
     return np.asarray(total / total[0] if total[0] > 0 else total)
 
 
 def _lags(record: AxisData) -> int:
-    """Lags up to a quarter of a second, at most a fiftieth of the record: sums are known then."""
+    """Return the lags up to 0.25 s, at most a fiftieth of the record, so that sums are well known."""
     return max(1, min(round(_LAG_S / record.sample_time_s), len(record) // 50))
 
 
 def slow_share(data: Sequence[AxisData], residuals: Sequence[Array]) -> float:
-    """Return the power of the residuals at low frequency over that of white ones.
+    """Return the power of the residuals at low frequency, relative to white residuals.
 
-    1 + 2 sum_k (1 - k / (L + 1)) rho(k), k from 1 to L: the power at frequency zero by Bartlett's
-    window, as it is for errors that slow derivatives average.
+    It is 1 + 2 sum_k (1 - k / (L + 1)) rho(k), k from 1 to L: the power at frequency zero with
+    Bartlett's window. Slow derivatives average errors, so this power decides their effect.
     """
     lags = min(_lags(d) for d in data)
     rho = _autocorrelation(residuals, lags)
@@ -139,10 +139,11 @@ def slow_share(data: Sequence[AxisData], residuals: Sequence[Array]) -> float:
 
 
 def start_findings(task: Task, point: Point, token: _core.CancelToken) -> tuple[str, ...]:
-    """Return words about records that start in motion, if a free start fits better than by chance.
+    """Return warnings about records that start in motion, if a free start fits better than by chance.
 
-    ``point`` is the end of an output-error fit from rest. Its loss and that with free starts are
-    compared as a likelihood ratio, samples counted by the power of the residuals at low frequency.
+    ``point`` is the end of an output-error fit from rest. A likelihood ratio compares its loss with
+    the loss for free starts. The power of the residuals at low frequency sets the effective number of
+    samples.
     """
     if not task.doubts:
         return ()
@@ -173,9 +174,9 @@ def covariance_findings(
     counts: tuple[int, int],
     residuals: Sequence[Array],
 ) -> tuple[list[str], bool]:
-    """Return words where errors are not white, and whether to trust the sandwich instead.
+    """Return warnings about errors that are not white, and whether to trust the sandwich instead.
 
-    ``counts`` are the blocks of the sandwich and its degrees of freedom.
+    ``counts`` are the number of blocks of the sandwich and its degrees of freedom.
     """
     n = len(names)
     blocks, freedom = counts
@@ -190,12 +191,12 @@ def covariance_findings(
             )
     share = slow_share(task.data, residuals)
     samples = sum(map(len, residuals)) / max(blocks, 1)
-    # The power of correlated errors at low frequency is also the number of samples that repeat.
+    # The share of low-frequency power is also the number of samples that count as one.
     if np.isfinite(sandwich).all() and share < samples:
         size = np.diag(covariance)
         seen = np.isfinite(size) & (size > 0)
         ratio = np.where(seen, np.sqrt(np.diag(sandwich) / np.where(seen, size, 1.0)), 1.0)
-        # Scatter of so many blocks, were the errors white.
+        # The scatter of the blocks that white errors would have.
         chance = stats.chi2.ppf([CHANCE / 2 / n, 1 - CHANCE / 2 / n], freedom) / freedom
         low, high = np.sqrt(chance)
         off = (ratio > max(high, DISAGREE)) | (ratio < min(low, 1 / DISAGREE))
@@ -220,10 +221,10 @@ def covariance_findings(
 
 
 def rise_of_loss(task: Task, point: Point, covariance: Array, n: int) -> Array:
-    """Return by how much the loss rises one standard error away, over the variance: 1 if linear.
+    """Return the rise of the loss one standard error away, over the variance; 1 for a linear model.
 
-    Along the principal axes of the first ``n`` parameters (scaled to unit variance), the mean of
-    both ways; all others move as the linear model says. NaN where the motion diverges.
+    The rise is the mean of both directions along each principal axis of the first ``n`` parameters,
+    scaled to unit variance. All other parameters follow the linear model. NaN if the motion diverges.
     """
     std = np.sqrt(np.diag(covariance)[:n])
     scaled = covariance[:n, :n] / np.outer(std, std)
@@ -254,9 +255,9 @@ def rise_of_loss(task: Task, point: Point, covariance: Array, n: int) -> Array:
 
 
 def curvature_findings(task: Task, point: Point, covariance: Array, variance: float) -> list[str]:
-    """Return words where the loss is no parabola within one standard error.
+    """Return a warning if the loss is not a parabola within one standard error.
 
-    Only a noise filter makes it so rough; without one it was within 4 % at noise of 3 %.
+    Only a noise filter makes the loss so rough; without one it is within 4 % at noise of 3 %.
     """
     n = len(task.free_names)
     if not (point.whitening and np.isfinite(covariance).all() and variance > 0):
@@ -275,21 +276,21 @@ def curvature_findings(task: Task, point: Point, covariance: Array, variance: fl
 
 
 def noise_weights(residuals: Sequence[Array]) -> tuple[float, ...]:
-    """Return weights one over the variance of the residuals, that of the first record one."""
+    """Return one over the variance of each record's residuals, scaled to one for the first record."""
     power = np.array([float(np.mean(r**2)) for r in residuals])
     floor = np.finfo(np.float64).tiny
     return tuple((max(power[0], floor) / np.maximum(power, floor)).tolist())
 
 
 def weight_findings(task: Task, residuals: Sequence[Array]) -> list[str]:
-    """Return words where weighted residuals of records differ by more than chance and cost."""
+    """Return a warning if the weighted residuals of records differ by more than chance and UNEQUAL."""
     if len(residuals) < 2:
         return []
     power, freedom = [], []
     for record, x in zip(task.data, residuals, strict=True):
         power.append(record.weight * float(np.mean(x**2)))
         rho = _autocorrelation([x], _lags(record))
-        # Squares of correlated errors count less.
+        # Correlated errors have fewer degrees of freedom than samples.
         freedom.append(max(len(x) / (1 + 2 * float(rho[1:] @ rho[1:])), 2.0))
     small, large = int(np.argmin(power)), int(np.argmax(power))
     if power[small] <= 0:

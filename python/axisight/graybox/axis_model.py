@@ -30,7 +30,7 @@ OUTPUT_UNIT = {"velocity": "rad/s", "velocity_difference": "rad/s", "position": 
 class AxisParameter:
     """A parameter of an axis model: its name in the thesis, unit, meaning and default bounds.
 
-    ``neutral`` is the value at which it changes nothing, ``None`` where a start must be given.
+    ``neutral`` is the value at which the parameter has no effect, or ``None`` if a fit needs a start.
     """
 
     name: str
@@ -46,35 +46,35 @@ class AxisParameter:
 class AxisModel:
     """Structure of the model of one axis, thesis (9.4)-(9.9), for two or more masses.
 
-    The motor, of inertia ``J_m``, drives through the gear ratio r (joint angle per motor angle)
-    and a spring a chain of ``n_masses - 1`` masses. The states are the deflections of the
-    springs and the speeds of the masses; the motor angle is one where something needs it.
+    The motor, of inertia ``J_m``, drives a chain of ``n_masses - 1`` masses through the gear ratio r
+    (joint angle per motor angle) and a spring. The states are the deflections of the springs and the
+    speeds of the masses, and the motor angle if the model needs it.
 
     =========================  ===========================================================
-    ``n_masses``               2 to 4, the motor included
-    ``gear_ratio``             r, positive; known unless ``r`` is freed in the fit
+    ``n_masses``               2 to 4, including the motor
+    ``gear_ratio``             r, positive; known unless the fit frees ``r``
     ``cubic``                  which springs have a cubic term (one flag each; gear first)
-    ``friction_smoothing_rad_s``  0: F_c sgn(speed), the sign followed exactly, a standing motor
-                               held while the drive is below F_c. Positive: F_c tanh(speed / it)
+    ``friction_smoothing_rad_s``  0: F_c sgn(speed) with the exact sign; the motor stands while the
+                               drive is below F_c. Positive, w: F_c tanh(speed / w)
     ``stribeck``               friction rises by ``F_s`` towards standstill, over ``v_s``
     ``viscous_asymmetry``      ``F_a`` times the size of the speed, for friction that differs
                                between the directions
-    ``torque_offset``          constant motor torque ``u_0``; the difference of Coulomb friction
-                               between the directions is the same thing while the motor turns
+    ``torque_offset``          constant motor torque ``u_0``; while the motor turns, a difference of
+                               Coulomb friction between the directions has the same effect
     ``backlash``               gap of half width ``b`` (joint side) before the gear spring
-    ``ripple_orders``          harmonics of the motor angle in the torque; amplitudes ``a_n``
+    ``ripple_orders``          harmonics of the motor angle in the torque, with amplitudes ``a_n``
                                of the cosine and ``b_n`` of the sine
     ``output``                 ``"velocity"`` of the motor at the samples, its
                                ``"velocity_difference"`` (backward difference of positions, as a
                                drive computes it), or its ``"position"``
     ``hold``                   torque between samples: ``"zero"`` (held) or ``"first"``
                                (straight lines)
-    ``initial``                every data set starts at ``"rest"``, or from speeds and
-                               deflections that are estimated with the parameters (``"free"``)
+    ``initial``                ``"rest"``: every data set starts at rest; ``"free"``: the fit
+                               estimates initial speeds and deflections with the parameters
     ``substeps``               Runge-Kutta steps (order 4) per sample
     =========================  ===========================================================
 
-    Raises InputError for a structure that no axis has.
+    Raises InputError naming the field that no axis can have.
     """
 
     n_masses: int = 2
@@ -92,7 +92,7 @@ class AxisModel:
     substeps: int = 1
 
     def __post_init__(self) -> None:
-        """Check the structure and fill in what depends on the number of masses."""
+        """Check the structure, and fill in defaults that depend on the number of masses."""
         _whole("n_masses", self.n_masses, 2, MOST_MASSES)
         _whole("substeps", self.substeps, 1, 1000)
         one_of("output", self.output, tuple(OUTPUT_UNIT))
@@ -126,19 +126,19 @@ class AxisModel:
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the parameters of this structure."""
         return tuple(p.name for p in self.parameters)
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Motor angle, deflections of the springs, speeds of the masses."""
+        """Names of the states: motor angle, deflections of the springs, speeds of the masses."""
         masses = [_mass(i) for i in range(self.n_masses)]
         springs = [f"deflection{_later(i)}" for i in range(self.n_masses - 1)]
         return ("angle_m", *springs, *[f"speed_{m}" for m in masses])
 
     @cached_property
     def _table(self) -> tuple[tuple[AxisParameter, bool], ...]:
-        """Every place of the core's parameter vector, and whether this structure uses it."""
+        """All parameters in the core's vector, and whether this structure uses them."""
         n, cubic = self.n_masses, self.cubic or ()
         springs = range(n - 1)
         signed = -np.inf
@@ -198,7 +198,7 @@ class AxisModel:
         return tuple(out)
 
     def core(self) -> CoreModel:
-        """Return the structure as the compiled core takes it."""
+        """Return the structure in the form of the compiled core."""
         return CoreModel(
             masses=self.n_masses,
             output=self.output,
@@ -209,13 +209,13 @@ class AxisModel:
         )
 
     def n_gains(self) -> int:
-        """Number of innovations gains: states without the motor angle."""
+        """Return the number of innovations gains, one per state other than the motor angle."""
         return 2 * self.n_masses - 1
 
     def complete(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return all parameters: those given, and neutral values for the rest that have one.
+        """Return all parameters: the given ones, and neutral values for the others.
 
-        Raises InputError for unknown, missing, non-finite or negative ones.
+        Raises InputError for unknown, missing, non-finite or negative parameters.
         """
         unknown = sorted(set(values) - set(self.parameter_names))
         if unknown:
@@ -244,7 +244,7 @@ class AxisModel:
         return [*theta, *(gains or [0.0] * self.n_gains())]
 
     def places(self) -> dict[str, int]:
-        """Return where each parameter of this structure stands in the core's vector."""
+        """Return the index of each parameter of this structure in the core's vector."""
         return {p.name: i for i, (p, used) in enumerate(self._table) if used}
 
     def simulate(
@@ -255,13 +255,15 @@ class AxisModel:
         *,
         start: ArrayLike | None = None,
     ) -> xr.Dataset:
-        """Simulate the axis under a motor torque.
+        """Return the simulated output and states of the axis under a motor torque.
 
-        ``torque_nm`` (n,); ``start`` (2 n_masses,): motor angle [rad], deflections [rad] and
-        speeds [rad/s] (`state_names`) at the first sample, at rest by default.
+        ``parameters`` are values by name, ``torque_nm`` is (n,), ``sample_time_s`` in s. ``start``
+        (2 n_masses,) holds motor angle [rad], deflections [rad] and speeds [rad/s] (`state_names`) at
+        the first sample, at rest by default.
 
-        Returns a Dataset over ``time`` with ``output`` (what the model measures) and
-        ``states`` (time, state). Raises InputError for misuse and for a motion that diverges.
+        Returns a Dataset over ``time`` [s] with ``output``, the quantity that the model's ``output``
+        names, and ``states`` (time, state). Raises InputError for misuse and for a motion that
+        diverges.
         """
         torque = samples("torque_nm", torque_nm)
         begin = np.zeros(2 * self.n_masses) if start is None else samples("start", start)
@@ -286,7 +288,7 @@ class AxisModel:
 
 @dataclass(frozen=True)
 class CoreModel:
-    """The structure as the compiled core reads it."""
+    """The structure in the form of the compiled core."""
 
     masses: int
     output: str
@@ -301,10 +303,10 @@ class CoreModel:
 class AxisData:
     """A record of one axis: motor torque and motor velocity or position at uniform samples.
 
-    ``torque_nm`` (n,), ``velocity_rad_s`` (n,) and/or ``position_rad`` (n,), motor side. The
-    model's output says which one is fitted; where a position is given, its first value is the
-    motor angle at the start, from which ripple is counted. ``weight`` multiplies the squared
-    residuals of this record. Raises InputError for wrong shapes, text, NaN and infinity.
+    ``torque_nm`` (n,), ``velocity_rad_s`` (n,) and/or ``position_rad`` (n,) are on the motor side.
+    The model's output decides which of them is fitted. The first position is the motor angle at the
+    start, which sets the phase of ripple. ``weight`` multiplies the squared residuals of this record.
+    Raises InputError for wrong shapes, text, NaN and infinity.
     """
 
     torque_nm: ArrayLike
@@ -315,7 +317,7 @@ class AxisData:
     weight: float = field(default=1.0, kw_only=True)
 
     def __post_init__(self) -> None:
-        """Check the samples and turn them into arrays."""
+        """Check the samples and convert them to arrays."""
         label = self.name or "data set"
         torque = samples(f"{label}: torque_nm", self.torque_nm)
         object.__setattr__(self, "torque_nm", torque)
@@ -337,11 +339,11 @@ class AxisData:
             raise InputError(f"{label}: weight: expected a positive number, got {self.weight}")
 
     def __len__(self) -> int:
-        """Number of samples."""
+        """Return the number of samples."""
         return len(np.asarray(self.torque_nm))
 
     def measured(self, model: AxisModel) -> Array:
-        """Return the output that a model of this structure predicts, (n,)."""
+        """Return the measured output (n,) that ``model`` predicts; raises InputError if it is missing."""
         wanted = self.position_rad if model.output == "position" else self.velocity_rad_s
         if wanted is None:
             raise InputError(
@@ -352,11 +354,11 @@ class AxisData:
         return np.asarray(wanted, np.float64)
 
     def start_angle_rad(self) -> float:
-        """Return the motor angle at the first sample, zero where no position is given."""
+        """Return the motor angle at the first sample [rad], zero without position."""
         return 0.0 if self.position_rad is None else float(np.asarray(self.position_rad)[0])
 
     def core(self, model: AxisModel, block_s: float = 1.0) -> CoreRecord:
-        """Return the record as the compiled core takes it."""
+        """Return the record in the form of the compiled core."""
         torque = np.asarray(self.torque_nm, np.float64)
         block = max(round(block_s / self.sample_time_s), 1)
         return torque, self.measured(model), self.sample_time_s, float(self.weight), block
@@ -407,7 +409,7 @@ def _mass(i: int) -> str:
 
 
 def _later(i: int) -> str:
-    """Suffix of what belongs to spring ``i``: none for the gear."""
+    """Return the suffix of parameter names of spring ``i``, empty for the gear."""
     return "" if i == 0 else f"_{i + 1}"
 
 

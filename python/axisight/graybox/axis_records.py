@@ -1,4 +1,4 @@
-"""Records of one axis, however they are given, as data for the fit."""
+"""Conversion of logs and records of one axis to data for the fit."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ Real = NDArray[np.float64]
 def axis_data(log: Log, axis: int = 1) -> AxisData:
     """Return one axis of a log as data for a fit.
 
-    Torque, position and the backward difference of the position, zero at the first sample, as
-    the velocity: models of it have ``output="velocity_difference"``. Raises InputError for an
-    axis the log does not have.
+    It has torque, position, and as velocity the backward difference of the position, zero at the
+    first sample. Fit it with models of ``output="velocity_difference"``. ``axis`` counts from 1.
+    Raises InputError for an axis that the log does not have.
     """
     axis = axis_number(axis, log.n_axes)
     position = log.position_rad[:, axis - 1]
@@ -30,7 +30,7 @@ def axis_data(log: Log, axis: int = 1) -> AxisData:
 
 
 def reference_of(record: AxisData | Log, axis: int) -> Real | None:
-    """Return the velocity reference of a log (n,) [rad/s]; None where there is none that moves."""
+    """Return the velocity reference of a log (n,) [rad/s], None without one or if it is constant."""
     if not isinstance(record, Log) or record.velocity_ref_rad_s is None:
         return None
     reference = record.velocity_ref_rad_s[:, axis - 1]
@@ -38,7 +38,7 @@ def reference_of(record: AxisData | Log, axis: int) -> Real | None:
 
 
 def as_data(record: AxisData | Log, axis: int, name: str) -> AxisData:
-    """Return a record, or one axis of a log, with velocity and a name; InputError for another type."""
+    """Return a record, or one axis of a log, with velocity and name; raises InputError for other types."""
     if isinstance(record, Log):
         return axis_data(record, axis)
     if not isinstance(record, AxisData):

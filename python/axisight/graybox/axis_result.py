@@ -1,4 +1,4 @@
-"""What a fit of an axis found, how sure it is, and what to mind."""
+"""The result of a fit of an axis: values, uncertainty and warnings."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from axisight.statistics.intervals import student_interval
 
 Array = NDArray[np.float64]
 
-# Beyond this, a combination of parameters is known a thousand times worse than the best one.
+# Beyond this condition, one parameter combination is known a thousand times worse than the best.
 POOR_CONDITION = 1e6
 
 _SEARCH_ADVICE = dict(_core.status_advice())
@@ -52,10 +52,10 @@ STATUS_ADVICE = _SEARCH_ADVICE | {
 @summarized
 @dataclass(frozen=True)
 class NoiseModel:
-    """How the prediction errors were made white.
+    """The noise model that whitens the prediction errors.
 
-    ``gains``: innovations gain K of (3.33) per sample, of the deflections, then of the speeds.
-    ``whitening``: a_1..a_p of ``A(q)``, with the noise ``e / A(q)``.
+    ``gains`` are the innovations gains K of (3.33) per sample: those of the deflections, then those of
+    the speeds. ``whitening`` are a_1..a_p of ``A(q)``, for the noise ``e / A(q)``.
     """
 
     kind: str
@@ -68,20 +68,23 @@ class NoiseModel:
 class AxisFit:
     """Result of `fit_axis`.
 
-    ``parameters`` holds all values, fixed ones too. The arrays run over ``free``, the names of
-    the fitted ones; ``covariance`` is that for white errors, ``sandwich`` the one from the
-    scatter of blocks of data, which stays valid where errors are correlated or the model is
-    incomplete. ``trusted`` names the one that `standard_error`, `interval` and `summary` take:
-    ``"sandwich"`` where the residuals contradict white errors of one variance and there are
-    blocks enough (``blocks`` of them), else ``"white"``; ``sandwich_freedom`` are its degrees of
-    freedom, blocks less everything estimated, gains and starts too. ``status`` is
-    ``loss_converged``, ``step_converged``, ``exact`` (residuals are rounding errors),
-    ``max_iterations``, ``stalled``, or ``noise_rounds`` (parameters and noise filter did not
-    agree). ``warnings`` say in words what to mind. ``residuals`` are the prediction errors by
-    record, model minus measurement, whitened by the noise model and not weighted; ``error_std`` is
-    the standard deviation of the weighted ones. ``weights`` are those of the records, given or
-    estimated. ``starts`` are the states (`AxisModel.state_names`) at the first sample of every
-    record.
+    ``parameters`` holds all values, including fixed ones. The arrays run over ``free``, the names of
+    the fitted parameters, in the units of the parameters.
+
+    - ``covariance`` holds for white errors. ``sandwich`` comes from the scatter of blocks of data,
+      and stays valid if errors are correlated or the model is incomplete.
+    - ``trusted`` names the covariance of `standard_error`, `interval` and `summary`. It is
+      ``"sandwich"`` if the residuals contradict white errors of one variance and ``blocks`` are
+      enough, else ``"white"``.
+    - ``sandwich_freedom``: degrees of freedom of the sandwich, that is, blocks minus all estimated
+      numbers, including gains and starts.
+    - ``status``: ``loss_converged``, ``step_converged``, ``exact`` (residuals are rounding errors),
+      ``max_iterations``, ``stalled``, or ``noise_rounds`` (parameters and noise filter did not agree).
+    - ``warnings`` say in words what to check.
+    - ``residuals``: prediction errors by record, model minus measurement, whitened by the noise model
+      and not weighted. ``error_std`` is the standard deviation of the weighted ones.
+    - ``weights`` of the records, given or estimated.
+    - ``starts``: states (`AxisModel.state_names`) at the first sample of every record.
     """
 
     model: AxisModel
@@ -112,11 +115,11 @@ class AxisFit:
 
     @property
     def converged(self) -> bool:
-        """Whether the search ended by itself."""
+        """Whether the search converged."""
         return self.status in CONVERGED
 
     def _repr_html_(self) -> str:
-        """Values with standard errors, for notebooks."""
+        """Return the values with standard errors, for notebooks."""
         unit = {p.name: p.unit for p in self.model.parameters}
         units = [unit[name] for name in self.free]
         fits = ", ".join(f"{fit:.2f} %" for fit in self.fit_percent)
@@ -128,16 +131,16 @@ class AxisFit:
 
     @property
     def standard_error(self) -> Array:
-        """Standard errors of the free parameters from the covariance that is ``trusted``."""
+        """Standard errors of the free parameters, from the ``trusted`` covariance."""
         return np.asarray(np.sqrt(np.diag(self._covariance(self.trusted))))
 
     def _covariance(self, kind: str) -> Array:
         return self.covariance if kind == "white" else self.sandwich
 
     def noise_weights(self) -> tuple[float, ...]:
-        """Return one over the variance of the residuals of each record, the first record's one.
+        """Return one over the variance of each record's residuals, scaled to one for the first record.
 
-        Weights for `AxisData` where sensor noise differs between records.
+        Use them as weights of `AxisData` if sensor noise differs between records.
         """
         return noise_weights(self.residuals)
 
@@ -149,9 +152,10 @@ class AxisFit:
     ) -> tuple[float, float]:
         """Return the confidence interval of a free parameter.
 
-        ``"white"`` trusts that the prediction errors are white and of one variance,
-        ``"sandwich"`` does not; ``"trusted"`` is the one of them that ``trusted`` names. The
-        sandwich of few blocks is itself uncertain: its quantiles are those of Student.
+        ``name`` is that of the parameter, ``level`` the probability. ``kind`` ``"white"`` assumes white
+        prediction errors of one variance, ``"sandwich"`` does not, and ``"trusted"`` is the one that
+        ``trusted`` names. Intervals from the sandwich use Student quantiles, because a sandwich of few
+        blocks is itself uncertain. Raises InputError for another kind.
         """
         one_of("name", name, self.free)
         if kind not in ("trusted", "white", "sandwich"):
@@ -164,11 +168,11 @@ class AxisFit:
         return float(low), float(high)
 
     def simulate(self, data: AxisData) -> Array:
-        """Simulate the output of a record from its torque, without feedback of errors, (n,)."""
+        """Return the output (n,) of a record, simulated from its torque without feedback of errors."""
         return self._run(data, predicts=False)
 
     def predict(self, data: AxisData) -> Array:
-        """Predict the output one sample ahead with the noise model's gain; else as simulated."""
+        """Return the one-step prediction (n,) with the noise model's gains; simulated without gains."""
         return self._run(data, predicts=bool(self.noise.gains))
 
     def _run(self, data: AxisData, *, predicts: bool) -> Array:
@@ -180,7 +184,7 @@ class AxisFit:
         )[0]
 
     def fit_to(self, data: AxisData, *, predicted: bool = False) -> float:
-        """Return the model fit (3.54) [%] to a record started at rest, for cross-validation."""
+        """Return the model fit (3.54) [%] to a record that starts at rest, for cross-validation."""
         run = self.predict if predicted else self.simulate
         return float(fit_percent(data.measured(self.model), run(data))[0])
 
@@ -221,14 +225,14 @@ class AxisFit:
 
 
 def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, ...]) -> AxisFit:
-    """Turn the end of a search into a result."""
+    """Return the result of a search that ended at ``point``."""
     model = task.model
     names = task.free_names
     errors, lengths = point.errors, [len(d) for d in task.data]
     variance = error_variance(task, point)
     inverse, condition = inverse_normal(point.matrix)
     n = len(names)
-    # What the data do not show stays unknown, even without any error.
+    # Parameters that the data do not show stay unknown, even without any error.
     covariance = np.where(np.isfinite(inverse), variance, 1.0) * inverse
     blocks, estimated = point.block_gradients.shape
     freedom = blocks - estimated
@@ -293,12 +297,12 @@ def conclude(task: Task, point: Point, noise: NoiseModel, warnings: tuple[str, .
     )
 
 
-# Fit (3.54) [%] from which residuals are no noise but what rounding left of the search.
+# Fit (3.54) [%] above which residuals are rounding errors of the search, not noise.
 ROUNDING = 100 - 1e-7
 
 
 def _sandwich(inverse: Array, gradients: Array, freedom: int) -> Array:
-    """Covariance from the scatter of block gradients; NaN where the blocks are too few."""
+    """Return the covariance from the scatter of block gradients, NaN for too few blocks."""
     blocks, n = gradients.shape
     if blocks < LEAST_BLOCKS * n:
         return np.full_like(inverse, np.nan)

@@ -1,4 +1,4 @@
-"""Searches for the parameters of an axis: the task, where a search stands, its rounds."""
+"""Searches for the parameters of an axis: the task, the state of a search, and its rounds."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Array = NDArray[np.float64]
 
 # Shares of the speed error fed back in rounds before the search proper, see `FitSettings`.
 GRADUAL = (0.2, 0.02)
-# Status of a search that ended by itself.
+# Statuses of a search that converged.
 CONVERGED = ("loss_converged", "step_converged", "exact")
-# Rounds need not be finished: where they end is a start.
+# Tolerance of rough rounds, which only give a start.
 ROUGH = 1e-4
 
 
@@ -26,20 +26,22 @@ ROUGH = 1e-4
 class FitSettings:
     """Settings of `fit_axis`.
 
-    The search stops when the linear model promises to lower the loss by less than
-    ``loss_tolerance`` of it, when no parameter moves by more than ``step_tolerance`` of itself,
+    The search stops when the linear model predicts a fall of the loss by less than
+    ``loss_tolerance`` of itself, when no parameter moves by more than ``step_tolerance`` of itself,
     or after ``max_iterations`` accepted steps. The tolerances are tight because stiffness-like
-    parameters hardly change the loss: with the usual 1e-8 the cubic term is left far off.
+    parameters hardly change the loss: with the usual 1e-8 the cubic term has a large error.
 
-    ``gradual`` gives observer gains of rough searches: the error of the predicted motor speed
-    is fed back to all speeds with that share per sample, which takes some local minima out of
-    the loss and puts others in. The search is done both ways, straight from the start and
-    after the rough ones, and the lower loss is kept; a warning tells where they disagree.
-    ``()`` leaves the second way out, two thirds of the work saved. ``block_s`` is the length
-    of the blocks of the sandwich covariance; it should exceed the correlation time of the
-    residuals. Without one it is 0.25 s, or less where the records have to give four blocks for
-    each parameter. ``ar_order`` fixes the order of the noise filter, otherwise chosen up to
-    ``most_ar_order``; ``ar_rounds`` bounds the refits.
+    ``gradual`` are the observer gains of rough searches. They feed that share of the error of the
+    predicted motor speed back to all speeds at every sample, which removes some local minima of the
+    loss and adds others. The fit searches both from the start and after the rough searches, and keeps
+    the lower loss; a warning tells if both disagree. ``()`` leaves out the rough searches and saves
+    two thirds of the work.
+
+    ``block_s`` [s] is the length of the blocks of the sandwich covariance; it should exceed the
+    correlation time of the residuals. None is 0.25 s, or less if the records would give fewer than
+    four blocks for each parameter. ``ar_order`` fixes the order of the noise filter; without it the
+    order is chosen up to ``most_ar_order``. ``ar_rounds`` limits the refits. Raises InputError naming
+    the field.
     """
 
     max_iterations: int = 100
@@ -71,7 +73,7 @@ class FitSettings:
 
 @dataclass(frozen=True)
 class Task:
-    """Everything a search needs but its start."""
+    """Model, data and settings of a search."""
 
     model: AxisModel
     data: tuple[AxisData, ...]
@@ -80,7 +82,7 @@ class Task:
     bounds: Mapping[str, tuple[float, float]]
     settings: FitSettings
     start: Mapping[str, float] = field(default_factory=dict)
-    # Words about records that may start in motion although the model starts at rest.
+    # Warnings about records that may start in motion although the model starts at rest.
     doubts: tuple[str, ...] = ()
 
     @property
@@ -89,7 +91,7 @@ class Task:
         return tuple(p.name for p in self.table if p.name in self.free)
 
 
-# Blocks for each parameter below which their scatter says nothing, and as many as are sought.
+# Blocks per parameter: fewest for which their scatter means anything, and the wanted number.
 LEAST_BLOCKS, ENOUGH_BLOCKS = 3, 4
 LONGEST_BLOCK_S = 0.25
 
@@ -104,7 +106,7 @@ def block_length_s(task: Task, n: int) -> float:
 
 @dataclass(frozen=True)
 class Point:
-    """Where a search stands: the core's vector of parameters and how errors are predicted."""
+    """The state of a search: the core's vector of parameters, and the noise model."""
 
     theta: tuple[float, ...]
     gains: tuple[float, ...] = ()
@@ -119,11 +121,11 @@ class Point:
     initial_loss: float = np.nan
     iterations: int = 0
     evaluations: int = 0
-    # Losses at which other ways from the same start ended.
+    # Final losses of the other searches from the same start.
     others: tuple[float, ...] = ()
 
     def vector(self, task: Task) -> list[float]:
-        """All parameters with the present gains."""
+        """Return all parameters with the present gains."""
         n, first = task.model.n_gains(), len(task.model.vector({})) - task.model.n_gains()
         theta = list(self.theta)
         theta[first : first + n] = self.gains or [0.0] * n
@@ -131,13 +133,13 @@ class Point:
 
 
 def first_point(task: Task, values: Mapping[str, float]) -> Point:
-    """The start of a search: parameters, no gains, and the start of every record."""
+    """Return the start of a search: parameters, no gains, and the start of every record."""
     theta = task.model.vector(values)
     for record in task.data:
         begin = [0.0] * (2 * task.model.n_masses)
         begin[0] = record.start_angle_rad()
         if task.model.initial == "free" and task.model.output != "position":
-            # The first backward difference is none.
+            # The first sample has no backward difference.
             first = int(task.model.output == "velocity_difference")
             speed = float(record.measured(task.model)[first])
             joint = [values["r"] * speed] * (task.model.n_masses - 1)
@@ -147,13 +149,13 @@ def first_point(task: Task, values: Mapping[str, float]) -> Point:
 
 
 def rigid_gains(model: AxisModel, ratio: float, share: float) -> tuple[float, ...]:
-    """Gains that turn all masses together: no spring is stretched by a correction."""
+    """Return gains that correct all masses alike, so that a correction deflects no spring."""
     springs = model.n_masses - 1
     return (*[0.0] * springs, share, *[ratio * share] * springs)
 
 
 def free_places(task: Task, point: Point) -> list[int]:
-    """Places of everything that may move in the core's vector."""
+    """Return the indices of all free entries of the core's vector."""
     model = task.model
     places = [i for name, i in model.places().items() if name in task.free]
     shared, states = len(model.vector({})), 2 * model.n_masses
@@ -169,7 +171,7 @@ def free_places(task: Task, point: Point) -> list[int]:
 
 
 def search(task: Task, point: Point, token: _core.CancelToken) -> Point:
-    """Minimize from a point; the counts of work add up."""
+    """Return the minimum reached from ``point``; iterations and evaluations include those of ``point``."""
     model, theta = task.model, point.vector(task)
     free = set(free_places(task, point))
     low = [-np.inf] * len(theta)
@@ -177,7 +179,7 @@ def search(task: Task, point: Point, token: _core.CancelToken) -> Point:
     for name, i in model.places().items():
         low[i], high[i] = task.bounds[name] if name in task.free else (theta[i], theta[i])
         if name.startswith(("J_", "k1", "v_s", "r")):
-            # Zero is no inertia, but a search may run there.
+            # An inertia cannot be zero, but a search may run towards zero.
             low[i] = max(low[i], 1e-6 * theta[i])
     specs = [
         (x, min(lo, x), max(hi, x), abs(x) or 1.0, i in free)
@@ -213,16 +215,16 @@ def search(task: Task, point: Point, token: _core.CancelToken) -> Point:
 
 
 def search_rounds(task: Task, point: Point, ratio: float, token: _core.CancelToken) -> Point:
-    """Minimize the output error, straight and after the rough rounds; return the better end.
+    """Return the better minimum of the output error, from a direct search and from one after rough rounds.
 
-    Neither way finds the global minimum always, and they fail on different records.
+    Neither search always finds the global minimum, and they fail on different records.
     """
     ends: list[Point] = []
     failure = None
     for rounds in dict.fromkeys(((), tuple(task.settings.gradual))):
         try:
             ends.append(_search_after(task, point, rounds, ratio, token))
-        except InputError as error:  # the motion diverged; the other way may do
+        except InputError as error:  # the motion diverged, but the other search may succeed
             failure = error
     if not ends:
         assert failure is not None
@@ -249,22 +251,22 @@ def _search_after(
 def error_variance(task: Task, point: Point) -> float:
     """Return the variance of the weighted prediction errors at the end of a search.
 
-    Degrees of freedom are samples less everything estimated, and less the first ones of each
-    record, which a noise filter leaves out.
+    Degrees of freedom are the samples minus all estimated numbers, and minus the first samples of
+    each record that a noise filter leaves out.
     """
     left_out = len(point.whitening) * len(task.data)
     freedom = point.errors.size - left_out - len(point.matrix)
     return float(point.errors @ point.errors) / max(freedom, 1)
 
 
-# Share of the energy of the data by which losses of one minimum may differ.
+# Losses within this share of the energy of the data belong to one minimum.
 SAME_MINIMUM = 1e-6
-# Share below which (a fit of 99 %) the data are explained and no lower minimum is missed.
+# A loss below this share (a fit of 99 %) explains the data, so no lower minimum is missed.
 EXPLAINED = 1e-4
 
 
 def disagreement(task: Task, point: Point) -> list[str]:
-    """Words where ways from the same start ended at different losses."""
+    """Return a warning if searches from the same start ended at different losses."""
     energy = sum(d.weight * float(np.sum(d.measured(task.model) ** 2)) for d in task.data)
     other = max(point.others, default=point.loss)
     if point.loss <= EXPLAINED * energy:
@@ -278,7 +280,7 @@ def disagreement(task: Task, point: Point) -> list[str]:
 
 
 def free_run(task: Task, point: Point, i: int) -> Array:
-    """Simulate record ``i`` from its estimated start, without feedback of errors."""
+    """Return record ``i`` simulated from its estimated start, without feedback of errors."""
     model, record = task.model, task.data[i]
     shared, states = len(model.vector({})), 2 * model.n_masses
     begin = point.theta[shared + i * states : shared + (i + 1) * states]

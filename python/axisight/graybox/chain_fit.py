@@ -26,8 +26,8 @@ _ROOM = 0.05
 _POOR_DB = 3.0
 _UNCERTAIN = 0.5
 _SPAN = 1e3
-# Relative distance to the end of the span within which a search has ended there: steps of the
-# trust region come close to a bound and do not reach it.
+# A value this close to the end of its span, relative to the span, counts as on the bound, because
+# steps of the trust region approach a bound and do not reach it.
 _AT_END = 0.01
 _BEYOND = 1.2
 
@@ -40,22 +40,22 @@ class ChainFit:
     chain
         Masses, springs, dampers.
     inertia_standard_error, stiffness_standard_error, damping_standard_error
-        In the units and shapes of the chain's values; from the scatter of every line about the
-        model (:func:`axisight.graybox.collocated.sandwich`), which errors of the model enlarge.
-        Infinite for what the lines do not show, NaN for what a single line decides. Not valid
-        for values on a bound.
+        In the units and shapes of the chain's values. They come from the scatter of every line about
+        the model (:func:`axisight.graybox.collocated.sandwich`), which errors of the model enlarge.
+        Infinite for values that the lines do not show, NaN for values that a single line decides. Not
+        valid for values on a bound.
     viscous_friction_nm_s_rad
-        Of the motor, motor side, with its standard error.
+        Viscous friction of the motor, motor side, with its standard error.
     delay_s
-        Pure delay; a held torque gives half a sample.
+        Pure delay [s]; a held torque gives half a sample.
     error_db
-        What half of the lines are within: modelled over measured response, magnitude and phase
+        Median over the lines of the error of modelled over measured response [dB], magnitude and phase
         together (1 rad counts as 8.7 dB).
     status
-        ``"converged"``, ``"on_bound"`` (masses, springs or dampers a thousandfold from the start,
-        beyond which none is sought: the minimum lies elsewhere) or ``"not_converged"``.
+        ``"converged"``, ``"not_converged"``, or ``"on_bound"``: masses, springs or dampers reached a
+        thousandfold of the start, the limit of the search, and the minimum lies elsewhere.
     findings
-        What to know before using the values.
+        Warnings to read before using the values.
     """
 
     chain: SpringMassChain
@@ -81,25 +81,25 @@ def fit_chain(
     start: SpringMassChain | None = None,
     delay: bool = True,
 ) -> ChainFit:
-    """Fit a chain of ``n_masses`` to a collocated response.
+    """Fit a chain of ``n_masses`` to a collocated response, and return it with standard errors.
 
-    A rational function with n - 1 pairs of zeros and poles, and a real one for the friction of
-    the motor, is fitted with relative weights (:func:`axisight.blackbox.fit_rational`). Its
-    frequencies give a chain by the inverse eigenvalue problem
-    (:func:`axisight.graybox.reconstruct_chain`), from which masses, springs, dampers, viscous
-    friction and delay are fitted to the logarithm of the response, (3.44), with exact gradients:
-    poles and zeros then alternate whatever the noise. If those of the rational function
-    do not, the start is taken from the peaks and the notches between them, and the findings say
-    so.
+    The start comes from a rational function with n - 1 pairs of zeros and poles, and a real pole for
+    the friction of the motor, fitted with relative weights (:func:`axisight.blackbox.fit_rational`).
+    Its frequencies give a chain by the inverse eigenvalue problem
+    (:func:`axisight.graybox.reconstruct_chain`). If its poles and zeros do not alternate, the start
+    comes from the peaks and the notches between them, and the findings say so.
+
+    From this start, masses, springs, dampers, viscous friction and delay are fitted to the logarithm
+    of the response, (3.44), with exact gradients. Poles and zeros of a chain alternate for any noise.
 
     Parameters
     ----------
     response, axis, quantity, band_hz : see :func:`axisight.graybox.collocated`.
-    n_masses : 2 or more, the motor included.
+    n_masses : 2 or more, including the motor.
     gear_ratio : r, joint angle per motor angle; masses beyond the motor, springs and dampers
         are on the joint side.
-    start : start here instead.
-    delay : whether a pure delay is fitted too.
+    start : chain at which the fit starts instead.
+    delay : whether to fit a pure delay too.
 
     Raises InputError for fewer than 2 masses, too few lines, or fewer resonances in the band
     than the chain has.
@@ -124,9 +124,9 @@ def fit_chain(
 
 
 def _start(data: Collocated, pairs: int, ratio: float, findings: list[str]) -> SpringMassChain:
-    """Chain of the poles and zeros of a rational fit, or of peaks and notches."""
+    """Return the chain with the poles and zeros of a rational fit, or with peaks and notches."""
     why, found = "", []
-    # Friction of the motor is one real pole more; in noise the fit may do better without.
+    # Friction of the motor adds a real pole, but with noise the fit can be better without it.
     for real in (1, 0):
         try:
             zeros, poles, gain = _rational(data, pairs, real)
@@ -147,7 +147,7 @@ def _start(data: Collocated, pairs: int, ratio: float, findings: list[str]) -> S
 
 
 def _distance(data: Collocated, chain: SpringMassChain) -> float:
-    """What half of the lines are within, as a logarithm."""
+    """Return the median error of the lines, as a logarithm."""
     model = chain.acceleration_response(data.frequency_hz)
     return float(np.median(np.abs(np.log(model / data.acceleration))))
 
@@ -168,9 +168,9 @@ def _reconstruct(
 def _rational(
     data: Collocated, pairs: int, real: int
 ) -> tuple[tuple[Real, Real], tuple[Real, Real], float]:
-    """Zeros and poles in pairs (frequencies, damping ratios) and gain of a rational fit.
+    """Return zeros and poles in pairs (frequencies, damping ratios), and the gain, of a rational fit.
 
-    ``real`` is how many real ones there are beside.
+    ``real`` is the number of real zeros and poles besides the pairs.
     """
     response = frequency_response(
         data.frequency_hz,
@@ -194,7 +194,7 @@ def _upper(roots: Complex, pairs: int, name: str) -> tuple[Real, Real]:
 
 
 def _peaks(data: Collocated, pairs: int) -> tuple[Real, Real]:
-    """The most prominent resonances and the lowest lines below each."""
+    """Return the most prominent resonances, and the lowest line below each."""
     level = np.log(np.abs(data.acceleration))
     found, properties = scipy.signal.find_peaks(level, prominence=0.1)
     if len(found) < pairs:
@@ -207,7 +207,7 @@ def _peaks(data: Collocated, pairs: int) -> tuple[Real, Real]:
     notches = [a + int(np.argmin(level[a:b])) for a, b in zip(before, strongest, strict=True)]
     omega = data.angular_rad_s
     peaks, low = omega[strongest], omega[notches]
-    # Neighbouring lines must not coincide.
+    # A notch on the line of a resonance would not alternate.
     floor = np.concatenate([[0.0], peaks[:-1]])
     return peaks, np.clip(low, floor + _ROOM * (peaks - floor), peaks - _ROOM * (peaks - floor))
 
@@ -215,10 +215,10 @@ def _peaks(data: Collocated, pairs: int) -> tuple[Real, Real]:
 class _Problem:
     """Residuals of the logarithm of the response, and their exact derivatives.
 
-    Lines are weighted by noise relative to the measured response, until ``reweigh``.
+    Until a call of ``reweigh``, weights come from noise relative to the measured response.
 
-    Unknowns: logarithms of masses and springs (within a thousandfold of the start), dampers,
-    friction and delay relative to a scale.
+    Unknowns are the logarithms of masses and springs (within a thousandfold of the start), and
+    dampers, friction and delay relative to a scale.
     """
 
     def __init__(self, data: Collocated, start: SpringMassChain, delay: bool) -> None:
@@ -252,9 +252,9 @@ class _Problem:
         self.upper[:free] = self.first[:free] + np.log(_SPAN)
 
     def at_end(self, x: Real) -> list[int]:
-        """Places of masses, springs and dampers at the end of their span.
+        """Return the indices of masses, springs and dampers at the end of their span.
 
-        Dampers that are zero are not: that is a chain too.
+        Dampers at zero do not count, because an undamped chain is valid.
         """
         free = 2 * self.n - 1
         apart = np.abs(x[:free] - self.first[:free]) >= np.log(_SPAN * (1 - _AT_END))
@@ -262,7 +262,7 @@ class _Problem:
         return np.flatnonzero(np.concatenate([apart, large])).tolist()
 
     def parts(self, x: Real) -> tuple[Real, Real, Real, float, float]:
-        """Inertias, stiffnesses, dampers, friction (joint side), delay."""
+        """Return inertias, stiffnesses, dampers, friction (joint side) and delay."""
         n = self.n
         return (
             np.exp(x[:n]),
@@ -273,7 +273,7 @@ class _Problem:
         )
 
     def _motion(self, x: Real) -> Complex:
-        """Angles of all masses per torque on the first, (n_lines, n)."""
+        """Return the angles of all masses per torque on the first, (n_lines, n)."""
         inertia, stiffness, damping, friction, _ = self.parts(x)
         s = 1j * self._omega
         spring = stiffness + s[:, None] * damping
@@ -289,31 +289,31 @@ class _Problem:
         return np.asarray(np.linalg.solve(system, unit[None])[..., 0])
 
     def _model(self, x: Real) -> Complex:
-        """Torque to acceleration of the motor, without delay."""
+        """Return the response from torque to acceleration of the motor, without delay."""
         return np.asarray(-(self._omega**2) * self._motion(x)[:, 0] / self._ratio**2)
 
     def reweigh(self, x: Real) -> float:
-        """Take weights from the model; return how much they change, relative, in the mean."""
+        """Take the weights from the model, and return their mean relative change."""
         before, self._weight = self._weight, self._data.weight(self._model(x))
         return float(np.mean(np.abs(self._weight / before - 1)))
 
     def error(self, x: Real) -> Complex:
-        """Logarithm of modelled over measured response, phase within half a turn."""
+        """Return the logarithm of modelled over measured response, with phase within half a turn."""
         apart = np.log(self._model(x)) - 1j * self._omega * self.parts(x)[4] - self._log
         return np.asarray(apart.real + 1j * np.angle(np.exp(1j * apart.imag)))
 
     def residual(self, x: Real) -> Real:
-        """Weighted errors, real and imaginary parts."""
+        """Return the weighted errors, real, then imaginary parts."""
         left = self.error(x) * self._weight
         return np.concatenate([left.real, left.imag])
 
     def standard_errors(self, x: Real) -> Real:
-        """Standard errors of the unknowns with the weights of the model ``x``."""
+        """Return the standard errors of the unknowns, with the weights of the model ``x``."""
         noise = self._weight**2 * self._data.noise(self._model(x))
         return standard_errors(self.jacobian(x), self.residual(x), noise)
 
     def jacobian(self, x: Real) -> Real:
-        """Derivatives of the residuals: d(e^T D^-1 e) = -x^T dD x, D symmetric."""
+        """Return the derivatives of the residuals, by d(e^T D^-1 e) = -x^T dD x for symmetric D."""
         inertia, stiffness, _, _, _ = self.parts(x)
         motion = self._motion(x)
         s = 1j * self._omega[:, None]
@@ -332,7 +332,7 @@ class _Problem:
 
 
 def _reweighted(problem: _Problem) -> tuple[scipy.optimize.OptimizeResult, bool]:
-    """Fit, take the weights from the model, and fit again until they stand."""
+    """Return the fit whose weights from the model no longer change, and whether they settled."""
     at = problem.first
     for _ in range(_MOST_PASSES):
         found: scipy.optimize.OptimizeResult = scipy.optimize.least_squares(
@@ -390,7 +390,7 @@ def _polish(data: Collocated, start: SpringMassChain, delay: bool, findings: lis
 
 
 def _doubts(n: int, ends: list[int], deviation: Real) -> list[str]:
-    """Words about values on a bound, and about those that the lines do not show."""
+    """Return warnings about values on a bound, and about values that the lines do not show."""
     names = [f"inertia {i + 1}" for i in range(n)]
     names += [f"{kind} {i + 1}" for kind in ("spring", "damper") for i in range(n - 1)]
     relative = deviation[: 2 * n - 1]

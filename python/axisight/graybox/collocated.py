@@ -21,23 +21,23 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _FEWEST_LINES = 8
-# Relative error of a response up to which simple models are not told from it.
+# Relative error that simple models of a response are allowed.
 _MODEL_FLOOR = 0.05
 
 
 @summarized
 @dataclass(frozen=True, eq=False)
 class Collocated:
-    """Lines of one axis that can be used.
+    """Usable lines of the collocated response of one axis.
 
     frequency_hz
         Ascending, (n,) [Hz].
     acceleration
         Torque to motor acceleration, complex (n,) [rad/s^2/Nm].
     variance
-        E|dG|^2 of it, (n,); NaN where unknown.
+        E|dG|^2 of ``acceleration``, (n,); NaN where unknown.
     degrees_of_freedom
-        Complex, of the variance; None if it is known exactly.
+        Complex degrees of freedom of the variance; None if the variance is known exactly.
     """
 
     frequency_hz: Real
@@ -56,7 +56,7 @@ class Collocated:
         return self.lines(kept)
 
     def lines(self, kept: NDArray[np.bool_]) -> Collocated:
-        """Return the lines that ``kept`` (n,) says."""
+        """Return the lines where ``kept`` (n,) is true."""
         return Collocated(
             self.frequency_hz[kept],
             self.acceleration[kept],
@@ -67,8 +67,8 @@ class Collocated:
     def noise(self, modelled: Complex | Real) -> Real:
         """Return the variance relative to the squared ``modelled`` response (n,), zero if unknown.
 
-        A variance from few periods scatters so much that chance would choose the lines: that of
-        neighbouring lines is taken (`pooled_variance`).
+        A variance from few periods scatters so much that chance would select the lines. Therefore
+        the variances of neighbouring lines are pooled (`pooled_variance`).
         """
         variance, freedom = self.variance, self.degrees_of_freedom
         count = neighbours_for(freedom, len(variance))
@@ -78,11 +78,11 @@ class Collocated:
         return np.asarray(known / np.abs(modelled) ** 2)
 
     def weight(self, modelled: Complex | Real) -> Real:
-        """Return what relative errors of each line are worth, (n,).
+        """Return the weights of relative errors at each line, (n,).
 
-        One over the standard deviation of noise and a tolerance of 5 % together, relative to the
-        ``modelled`` response (n,). Relative to the measured one, lines that noise has made small
-        would count less, and the model come out too large.
+        They are one over the standard deviation of noise and a tolerance of 5 % together, relative to
+        the ``modelled`` response (n,). Relative to the measured one, lines that noise made small
+        would count less, and the model would become too large.
         """
         return np.asarray(1 / np.sqrt(self.noise(modelled) + _MODEL_FLOOR**2))
 
@@ -94,20 +94,20 @@ def collocated(
     quantity: str | None = None,
     band_hz: tuple[float, float] | None = None,
 ) -> Collocated:
-    """Return element (axis, axis) of a frequency response as torque to acceleration.
+    """Return element (axis, axis) of a frequency response, from torque to acceleration.
 
     Parameters
     ----------
-    response : Dataset as the estimators of `axisight.frf` return, torque in and motor motion
-        out; lines that are flagged or zero are left out.
+    response : Dataset of an estimator of `axisight.frf`, from torque to motor motion. Lines that are
+        flagged or zero are left out.
     axis : the axis, from 1.
-    quantity : what the output is, ``"position"``, ``"velocity"`` or ``"acceleration"``; None:
-        what the Dataset says of itself, by the units of ``response`` (rad/Nm, rad/s/Nm,
-        rad/s^2/Nm; the unit of the input does not matter) or its attribute ``quantity``.
-    band_hz : lines outside are left out.
+    quantity : output of the response, ``"position"``, ``"velocity"`` or ``"acceleration"``. None:
+        taken from the units of ``response`` (rad/Nm, rad/s/Nm, rad/s^2/Nm; the unit of the input does
+        not matter) or from the attribute ``quantity``.
+    band_hz : lowest and highest line to keep [Hz].
 
-    Raises InputError for another Dataset, an axis it does not have, fewer than eight lines, and a
-    Dataset of which neither units nor attribute tell the quantity, or both differently.
+    Raises InputError for another Dataset, an axis that it does not have, fewer than eight lines, and a
+    quantity on which units and attribute are silent or contradict each other.
 
     """
     if not isinstance(response, xr.Dataset) or "response" not in response:
@@ -141,31 +141,32 @@ def collocated(
 
 
 def standard_errors(slope: Real, residual: Real, noise: Real) -> Real:
-    """Standard errors of a weighted least-squares estimate, (p,).
+    """Return the standard errors of a weighted least-squares estimate, (p,).
 
-    From the scatter of the lines (`sandwich`), but not below what the known noise makes of them:
-    ``noise`` (n,) is the variance of the complex residual of each line, zero if unknown.
-    Infinite for parameters that the lines do not show, NaN for those that one line decides.
+    They come from the scatter of the lines (`sandwich`), but are not below those from the known noise.
+    ``noise`` (n,) is the variance of the complex residual of each line, zero if unknown. Standard
+    errors are infinite for parameters that the lines do not show, and NaN for those that one line
+    decides.
     """
     inverse, _, _ = pseudo_inverse(slope.T @ slope)
-    # Half of the variance in the real and half in the imaginary part.
+    # Real and imaginary part each carry half of the variance.
     noisy = np.tile(np.sqrt(noise / 2), 2)[:, None] * slope @ inverse
     least = (noisy**2).sum(axis=0)
     return np.asarray(np.sqrt(np.maximum(np.diag(sandwich(slope, residual)), least)))
 
 
 def sandwich(slope: Real, residual: Real) -> Real:
-    """Covariance of a least-squares estimate from the scatter of each line (White 1980).
+    """Return the covariance of a least-squares estimate from the scatter of each line (White 1980).
 
-    ``slope`` (2 n, p) and ``residual`` (2 n,) hold the real parts of all n lines, then the
-    imaginary ones; a line's two belong together. Right whatever the weights, which here are a
-    compromise between noise and the errors of simple models. Each line's residuals are enlarged
-    by what the fit has taken from them (`ClusterScatter`): the few lines of a notch decide much and
-    would show too little.
+    ``slope`` (2 n, p) and ``residual`` (2 n,) hold the real parts of all n lines, then the imaginary
+    parts; both parts of a line form one cluster. The covariance is right for any weights, which here
+    are a compromise between noise and the errors of simple models. `ClusterScatter` corrects each
+    line's residuals for the part that the fit has absorbed. Without it the few lines of a notch,
+    which decide much, would show too little scatter.
 
-    Parameters that the lines do not show have an infinite variance. Where a line alone decides a
-    direction, its residuals are zero there and show no scatter; parameters that owe such
-    directions more than half of their variance have NaN, for it is unknown.
+    Parameters that the lines do not show have an infinite variance. If one line alone decides a
+    direction, its residuals there are zero and show no scatter. Parameters with more than half of
+    their variance from such directions are NaN, because their variance is unknown.
     """
     lines = len(residual) // 2
     rows = slope.reshape(2, lines, -1).swapaxes(0, 1)

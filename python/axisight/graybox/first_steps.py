@@ -1,4 +1,4 @@
-"""Steps 1 and 2 of chapter 9: what the fit of one axis starts from.
+"""Steps 1 and 2 of chapter 9: the start of the fit of one axis.
 
 Wernholt (2004), sections 9.3.1 and 9.3.2.
 """
@@ -34,25 +34,25 @@ Real = NDArray[np.float64]
 Lines = Sequence[int] | NDArray[np.int64]
 
 _LEAST_DAMPING = 0.01
-"""Twice the damping ratio of a mass on its spring, at which a chain starts at least."""
+"""Least damping at the start of a chain: twice the damping ratio of a mass on its spring."""
 
 
 @summarized
 @dataclass(frozen=True)
 class InitialModel:
-    """What steps 1 and 2 found.
+    """Result of steps 1 and 2.
 
     rigid
-        Step 1.
+        Result of step 1.
     responses, flexibilities
-        Frequency response (torque to motor acceleration) of each broadband record and what it
-        gave.
+        Frequency response (torque to motor acceleration) of each broadband record, and its two-mass
+        parameters.
     spring
         k1 and k3 by (9.14); None with one amplitude.
     start
-        Start of step 3 by the names of the model.
+        Start of step 3, by parameter names of the model.
     findings
-        What to know.
+        Warnings to read before using the values.
     """
 
     rigid: RigidBodyFriction
@@ -81,23 +81,24 @@ def initial_model(
 ) -> InitialModel:
     """Return initial parameters by steps 1 and 2.
 
-    Step 1 (:func:`rigid_body_friction`) from ``rigid``; step 2 (:func:`initial_flexibility`)
-    from the response of each of ``broadband``, whose J_m are averaged; k1 and k3 from their
-    stiffnesses (:func:`cubic_spring`). With more than two masses the chain comes from
-    :func:`fit_chain` on the record of the smallest torque.
+    Step 1 (:func:`rigid_body_friction`) uses ``rigid``. Step 2 (:func:`initial_flexibility`) uses the
+    response of each of ``broadband`` and averages their J_m. Their stiffnesses give k1 and k3
+    (:func:`cubic_spring`). With more than two masses, :func:`fit_chain` on the record of the smallest
+    torque gives the chain.
 
     Parameters
     ----------
     rigid : low-frequency motion in both directions, e.g. a triangle wave.
     broadband : periodic records, of different amplitudes for k3.
     gear_ratio : r, joint angle per motor angle.
-    axis : of logs, from 1.
-    n_masses : of the model.
-    period_s, lines, drop_periods : of the broadband records; None: found from the reference of
-        logs, else from the torque, see :func:`axisight.records.prepare_records`.
-    cutoff_hz, least_speed_rad_s : of step 1.
-    notch_band_hz, plateau_from_hz : of step 2.
-    spring_method : of :func:`cubic_spring`; ``"samples"`` is (9.14) to the letter.
+    axis : axis of the logs, from 1.
+    n_masses : number of masses of the model.
+    period_s, lines, drop_periods : period [s], lines and dropped periods of the broadband records.
+        None: detected from the reference of logs, or else from the torque, see
+        :func:`axisight.records.prepare_records`.
+    cutoff_hz, least_speed_rad_s : arguments of step 1.
+    notch_band_hz, plateau_from_hz : arguments of step 2.
+    spring_method : method of :func:`cubic_spring`; ``"samples"`` is (9.14) itself.
 
     Raises InputError as these functions do, and for records without position.
 
@@ -144,7 +145,7 @@ def initial_model(
         findings += list(spring.findings)
     else:
         findings.append("one broadband record only: k3 starts at zero; measure a second amplitude")
-    # A spring that softens with the cube of its deflection gives way beyond some torque.
+    # A softening cubic spring cannot hold torques above some limit.
     usable = spring is not None and spring.cubic_nm_rad3 >= 0 and spring.linear_nm_rad > 0
     if spring is not None and not usable:
         findings.append("step 3 starts with k3 = 0 and the mean stiffness")
@@ -175,7 +176,7 @@ def _response(
     lines: Lines | None,
     drop_periods: int | None,
 ) -> tuple[xr.Dataset, list[str]]:
-    """Return torque to motor acceleration, and what puts it in doubt."""
+    """Return the response from torque to motor acceleration, and warnings about it."""
     run = Experiment(
         data.sample_time_s, np.asarray(data.torque_nm), position_of(data), reference, data.name
     )
@@ -198,7 +199,7 @@ def _spring(
     ratio: float,
     method: Literal["samples", "sets"],
 ) -> CubicSpring:
-    """k1 and k3 from deflections simulated with the linear spring of each record."""
+    """Return k1 and k3 from deflections simulated with the linear spring of each record."""
     deflections = [
         simulate_deflection(
             record.torque_nm,
@@ -218,7 +219,7 @@ def _spring(
         2 * k * one.notch.frequency_standard_error_rad_s / one.notch.frequency_rad_s
         for one, k in zip(flexibilities, stiffness, strict=True)
     ]
-    # What one line decides alone has no standard error.
+    # A value that one line decides alone has no standard error.
     known = errors if np.isfinite(errors).all() else None
     return cubic_spring(stiffness.tolist(), deflections, standard_error_nm_rad=known, method=method)
 
@@ -226,14 +227,14 @@ def _spring(
 def _chain(
     response: xr.Dataset, n_masses: int, ratio: float, findings: list[str]
 ) -> dict[str, float]:
-    """Chain of the response in the names of the model."""
+    """Return the chain of the response by parameter names of the model."""
     found = fit_chain(response, n_masses, gear_ratio=ratio)
     findings += list(found.findings)
     chain = found.chain
     out = {"J_m": chain.motor_inertia_kg_m2}
     for i, inertia in enumerate(chain.inertia_kg_m2[1:], 1):
         out["J_a" if i == 1 else f"J_a{i}"] = float(inertia)
-    # A cubic spring's notch can look undamped; the search starts off the bound.
+    # The notch of a cubic spring can look undamped, and a search must not start on the bound.
     least = _LEAST_DAMPING * np.sqrt(chain.stiffness_nm_rad * chain.inertia_kg_m2[1:])
     dampers = np.maximum(chain.damping_nm_s_rad, least)
     for i, (k, d) in enumerate(zip(chain.stiffness_nm_rad, dampers, strict=True), 1):

@@ -34,7 +34,7 @@ _ALIKE = 1.1
 @summarized
 @dataclass(frozen=True)
 class Flexibility:
-    """Two-mass values that one frequency response gives, with standard errors.
+    """Two-mass parameters from one frequency response, with standard errors.
 
     motor_inertia_kg_m2
         J_m, the inverse of the high-frequency gain.
@@ -45,9 +45,9 @@ class Flexibility:
     damping_nm_s_rad
         d = 2 zeta w_n J_a, from the width of the notch.
     notch, resonance, gain
-        What was read from the response.
+        Features of the response from which the values follow.
     findings
-        What to know before using the values.
+        Warnings to read before using the values.
     """
 
     motor_inertia_kg_m2: float
@@ -78,14 +78,14 @@ def initial_flexibility(
 ) -> Flexibility:
     """Return J_m, J_a, k and d from notch and high-frequency gain, (9.13).
 
-    Torque to motor acceleration of two masses, damping in the gear included, is
+    The response of two masses from torque to motor acceleration, with damping in the gear, is
 
         s (J_a s^2 + d s + k) / (J_m J_a s^3 + ...),
 
-    so that 1 / J_m is its high-frequency gain and sqrt(k / J_a) its notch. The notch is
-    estimated between the lines (:func:`axisight.graybox.find_notch`), the gain with what the
-    resonances still add (:func:`axisight.graybox.high_frequency_gain`). The thesis ignores d
-    here; its notch has a width, and that gives it.
+    so that 1 / J_m is its high-frequency gain and sqrt(k / J_a) its notch. The notch is estimated
+    between the lines (:func:`axisight.graybox.find_notch`). The gain is corrected for the
+    contribution of the resonances (:func:`axisight.graybox.high_frequency_gain`). The thesis ignores
+    d here; this function takes d from the width of the notch.
 
     Parameters
     ----------
@@ -93,11 +93,11 @@ def initial_flexibility(
     rigid_inertia_kg_m2, rigid_standard_error : J = J_m + r^2 J_a on the motor side, step 1.
     gear_ratio : r, joint angle per motor angle.
     axis, quantity, band_hz : see :func:`axisight.graybox.collocated`.
-    notch_band_hz : where to look for the notch; default the whole band.
-    plateau_from_hz : lines of the high-frequency gain; default from 1.6 times the highest peak.
+    notch_band_hz : band of the search for the notch [Hz]; default the whole band.
+    plateau_from_hz : lowest line of the high-frequency gain [Hz]; default 1.6 times the highest peak.
 
-    Raises InputError naming what the response lacks: a notch or a resonance in the band, a
-    plateau above it; and for an inertia of step 1 not above that of the motor.
+    Raises InputError if the response has no notch or resonance in the band or no plateau above it,
+    and if the inertia of step 1 is not above that of the motor.
 
     """
     for name, value in (("rigid_inertia_kg_m2", rigid_inertia_kg_m2), ("gear_ratio", gear_ratio)):
@@ -148,7 +148,7 @@ def initial_flexibility(
 def _findings(
     rigid: float, motor: float, notch: Landmark, resonance: Landmark, ratio: float
 ) -> tuple[str, ...]:
-    """What does not fit two masses."""
+    """Return warnings about properties that two masses do not have."""
     found = []
     expected = notch.frequency_rad_s * np.sqrt(rigid / motor)
     apart = resonance.frequency_rad_s / expected - 1
@@ -162,7 +162,7 @@ def _findings(
         found.append(
             f"gear_ratio {ratio:g}: it is joint angle per motor angle, below one for a reduction"
         )
-    # An unknown error does not show damping either.
+    # Written with "not", so that an unknown (NaN) error also counts as no damping shown.
     if not notch.damping_ratio >= 2 * notch.damping_standard_error:
         found.append("the notch is too narrow or too noisy to show damping: d is a guess")
     return tuple(found)
@@ -171,12 +171,12 @@ def _findings(
 @summarized
 @dataclass(frozen=True)
 class CubicSpring:
-    """Spring torque k1 x + k3 x^3 from stiffnesses at several amplitudes.
+    """Spring torque k1 x + k3 x^3, from stiffnesses at several amplitudes.
 
     linear_nm_rad, cubic_nm_rad3
         k1 and k3, with standard errors from those of the stiffnesses (NaN without).
     deflection_rms_rad
-        Of each data set.
+        Rms deflection of each data set.
     """
 
     linear_nm_rad: float
@@ -196,21 +196,21 @@ def cubic_spring(
 ) -> CubicSpring:
     """Return k1 and k3 from the stiffness k_i at several amplitudes.
 
-    ``deflection_rad`` holds the deflection x of each set, see :func:`simulate_deflection`.
+    ``stiffness_nm_rad`` holds k_i [Nm/rad] of each set, and ``deflection_rad`` its deflection x [rad],
+    see :func:`simulate_deflection`.
 
     method
-        ``"samples"`` minimises (9.14), the sum over sets and samples of
-        (k_i x - k1 x - k3 x^3)^2. Within a set the data are a straight line, which pulls k3 towards
-        zero: normally distributed deflections at amplitudes 1 : 2 give 14 % of k3, and a k1
-        near the stiffness of the larger set. ``"sets"`` fits the equivalent gain of every
-        set, k_i = k1 + k3 E[x^4] / E[x^2], the stiffness of least squares for one set (3 s^2 k3 with
-        normal x, its describing function), by least squares over the sets; exact where the
-        k_i are equivalent gains.
+        ``"samples"`` minimises (9.14), the sum over sets and samples of (k_i x - k1 x - k3 x^3)^2.
+        Within a set the data are a straight line, which biases k3 towards zero: normally distributed
+        deflections at amplitudes 1 : 2 give 14 % of k3, and a k1 near the stiffness of the larger set.
+        ``"sets"`` fits the equivalent gain k_i = k1 + k3 E[x^4] / E[x^2] of every set by least squares
+        over the sets. That gain is the least-squares stiffness of one set; for normal x its cubic part
+        is 3 s^2 k3, the describing function. The method is exact if the k_i are equivalent gains.
     standard_error_nm_rad
-        Of the k_i; both methods are linear in them.
+        Standard errors of the k_i; both methods are linear in the k_i.
 
-    Raises InputError for fewer than two sets, for deflections that are zero, and for
-    amplitudes less than 10 % apart: then k1 and k3 cannot be told apart.
+    Raises InputError for fewer than two sets, for zero deflections, and for amplitudes less than 10 %
+    apart, which do not separate k1 and k3.
     """
     stiffness, sets = _amplitudes(stiffness_nm_rad, deflection_rad)
     rms = np.array([np.sqrt(np.mean(x**2)) for x in sets])
@@ -219,7 +219,7 @@ def cubic_spring(
             f"deflection_rad: expected amplitudes at least 10 % apart, got rms {rms.min():.3g} to "
             f"{rms.max():.3g} rad; k1 and k3 cannot be told apart, measure at another amplitude"
         )
-    # Deflections in units of the largest rms.
+    # Deflections relative to the largest rms keep the equations well scaled.
     unit = rms.max()
     second, fourth, sixth = (np.array([np.sum((x / unit) ** p) for x in sets]) for p in (2, 4, 6))
     if method == "samples":
@@ -289,13 +289,13 @@ def simulate_deflection(
 ) -> Real:
     """Return the deflection x1 = r phi_m - phi_a [rad], (n,), of (9.9) with a linear spring.
 
-    From rest. Coulomb friction takes the sign of the measured velocity, so that the rest is
-    linear and exact for a torque held from sample to sample.
+    The simulation starts at rest. Coulomb friction takes the sign of the measured velocity, so that
+    the remaining model is linear and exact for a torque held from sample to sample.
 
     Parameters
     ----------
-    torque_nm, velocity_rad_s : of the motor, (n,), sampled every
-    sample_time_s : [s].
+    torque_nm, velocity_rad_s : torque and velocity of the motor, (n,).
+    sample_time_s : sample time [s].
     motor_inertia_kg_m2, viscous_friction_nm_s_rad, coulomb_friction_nm : J_m, F_v, F_c, motor side.
     arm_inertia_kg_m2, stiffness_nm_rad, damping_nm_s_rad : J_a, k, d, joint side.
     gear_ratio : r, joint angle per motor angle.
@@ -314,7 +314,7 @@ def simulate_deflection(
         raise InputError("torque_nm, velocity_rad_s: expected finite numbers")
     r, k, d = gear_ratio, stiffness_nm_rad, damping_nm_s_rad
     motor, arm = motor_inertia_kg_m2, arm_inertia_kg_m2
-    # Held input as a fourth state: one exponential gives both matrices.
+    # With the held input as a fourth state, one exponential gives both matrices.
     system = np.zeros((4, 4))
     system[0, :3] = 0.0, r, -1.0
     system[1, :3] = np.array([-r * k, -viscous_friction_nm_s_rad - r * d * r, r * d]) / motor

@@ -1,4 +1,4 @@
-"""Notch, resonance and high-frequency gain of a collocated response, between its lines."""
+"""Notch, resonance and high-frequency gain of a collocated response, estimated between its lines."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class Landmark:
     frequency_rad_s, damping_ratio
         Natural frequency and damping ratio of the pair of zeros or poles.
     frequency_standard_error_rad_s, damping_standard_error
-        From the scatter about the local model; NaN where a single line decides.
+        From the scatter about the local model; NaN if a single line decides.
     n_lines
-        Lines that took part.
+        Number of lines used.
     """
 
     frequency_rad_s: float
@@ -49,15 +49,15 @@ class Landmark:
 @summarized
 @dataclass(frozen=True)
 class HighFrequencyGain:
-    """Level of torque to acceleration far above the resonances, 1 / J_m.
+    """Level of the response from torque to acceleration far above the resonances, 1 / J_m.
 
     gain, standard_error
-        [rad/s^2/Nm], at infinite frequency; the error is that of noise, without what the series
-        leaves out, up to 1 % from 1.6 times the last peak on.
+        Gain at infinite frequency [rad/s^2/Nm]. The standard error is that of noise. It does not
+        include the truncation of the series, up to 1 % for lines from 1.6 times the last peak on.
     correction
-        How much larger the response still is at the upper end of the band, relative.
+        Excess of the response at the upper end of the band over the gain, relative to the gain.
     from_rad_s, to_rad_s
-        Lines used.
+        Lowest and highest line used [rad/s].
     """
 
     gain: float
@@ -70,19 +70,19 @@ class HighFrequencyGain:
 def find_notch(data: Collocated, *, band_rad_s: tuple[float, float] | None = None) -> Landmark:
     """Return the first notch, estimated between the lines.
 
-    The lowest line is looked for (of ``band_rad_s``, or all of those below the highest
-    resonance), after a median over three lines. About it, within 30 %, the logarithm of the
-    response is a pair of zeros and surroundings,
+    The search starts at the lowest line of ``band_rad_s`` (default: of all lines below the highest
+    resonance), after a median over three lines. Within 30 % of it, the logarithm of the response is a
+    pair of zeros and surroundings,
 
         log G = log(w0^2 - w^2 + 2 i zeta w0 w) + c0 + c1 x + c2 x^2,  x = w / w0 - 1,
 
-    with complex c: delay, friction and the flanks of neighbours. w0 and zeta by nonlinear, c by
-    linear least squares (variable projection), lines weighted by their variance and a
-    tolerance of 5 % of the response for what the local model lacks, both relative to the model
-    of the last of four passes.
+    with complex c for delay, friction and the flanks of neighbours. Nonlinear least squares gives w0
+    and zeta, and linear least squares c (variable projection). Weights come from the variance of a
+    line and a tolerance of 5 % for errors of the local model, both relative to the model of the last
+    of four passes.
 
-    Raises InputError if the lowest line is at the edge of the band, or no 6 dB below what
-    lies on either side, that is where the band holds no notch.
+    Raises InputError if the band holds no notch, that is, if the lowest line is at the edge of the
+    band or not 6 dB below the response on both sides.
     """
     omega, level = data.angular_rad_s, _level_db(data)
     inside = np.ones(len(omega), bool)
@@ -110,9 +110,9 @@ def find_resonance(
 ) -> Landmark:
     """Return the highest resonance between ``above_rad_s`` and ``below_rad_s``.
 
-    Estimated between the lines as in :func:`find_notch`.
+    The estimate between the lines is that of :func:`find_notch`.
 
-    Raises InputError if the highest line is at the edge of the band.
+    Raises InputError if the band is empty or the highest line is at its edge.
     """
     omega, level = data.angular_rad_s, _level_db(data)
     inside = (omega > above_rad_s) & (omega < below_rad_s)
@@ -131,13 +131,13 @@ def find_resonance(
 def high_frequency_gain(data: Collocated, *, from_rad_s: float) -> HighFrequencyGain:
     """Return the gain far above the resonances from lines above ``from_rad_s``.
 
-    There |G| = g (1 + c / w^2 + e / w^4) to sixth order in 1 / w, c being the sum of the squared
-    resonances less that of the notches. g, c and e by least squares on the logarithm, which noise
-    does not shift, lines weighted by their variance and a tolerance of 5 % relative to the model
-    of the last of four passes; the standard error is from the scatter.
+    There |G| = g (1 + c / w^2 + e / w^4), with an error of sixth order in 1 / w; c is the sum of the
+    squared resonances minus that of the squared notches. Least squares on the logarithm, which noise
+    does not bias, gives g, c and e. Weights come from the variance of a line and a tolerance of 5 %,
+    both relative to the model of the last of four passes. The standard error comes from the scatter.
 
-    Raises InputError if fewer than eight lines are left, or the response at the upper
-    end of the band is still a quarter above its level: then there is no plateau to read J_m from.
+    Raises InputError if fewer than eight lines are left, or if the response at the upper end of the
+    band is still a quarter from the gain, because the band then has no plateau.
     """
     high = data.between(from_rad_s, np.inf)
     omega, size = high.angular_rad_s, np.abs(high.acceleration)
@@ -155,7 +155,7 @@ def high_frequency_gain(data: Collocated, *, from_rad_s: float) -> HighFrequency
     modelled = size
     for _ in range(_PASSES):
         weight = high.weight(modelled)
-        # A Gauss-Newton step of the logarithm: relative errors, the logarithm as target.
+        # A Gauss-Newton step for the logarithm, so that errors are relative.
         slope = basis * (weight / modelled)[:, None]
         level, covariance = _least_squares(slope, (1 + np.log(size / modelled)) * weight)
         modelled = np.abs(basis @ level)
@@ -172,7 +172,7 @@ def high_frequency_gain(data: Collocated, *, from_rad_s: float) -> HighFrequency
 
 
 def plateau_start(data: Collocated) -> float:
-    """Return where the plateau may begin [rad/s]: 1.6 times the last peak of 3 dB or more."""
+    """Return the frequency from which a plateau is possible [rad/s]: 1.6 times the last peak of 3 dB."""
     peaks, _ = scipy.signal.find_peaks(_level_db(data), prominence=_PEAK_DB)
     if not len(peaks):
         raise InputError("response: expected a resonance of 3 dB or more in the band, got none")
@@ -180,12 +180,12 @@ def plateau_start(data: Collocated) -> float:
 
 
 def _level_db(data: Collocated) -> Real:
-    """Magnitude in decibel; a single wild line is no landmark."""
+    """Return the magnitude [dB], after a median that removes single outliers."""
     return np.asarray(scipy.signal.medfilt(20 * np.log10(np.abs(data.acceleration)), 3))
 
 
 def _least_squares(basis: Real, target: Real) -> tuple[Real, Real]:
-    """Solution and covariance with the variance the residuals show."""
+    """Return solution and covariance, with the variance of the residuals."""
     solution, _, _, _ = np.linalg.lstsq(basis, target, rcond=None)
     left = target - basis @ solution
     freedom = max(len(target) - basis.shape[1], 1)
@@ -194,7 +194,7 @@ def _least_squares(basis: Real, target: Real) -> tuple[Real, Real]:
 
 
 def _pair(data: Collocated, start_rad_s: float, sign: float) -> Landmark:
-    """Fit a pair of zeros (sign 1) or poles (-1) with smooth surroundings."""
+    """Return a fitted pair of zeros (sign 1) or poles (-1) with smooth surroundings."""
     near = data.between((1 - _WINDOW) * start_rad_s, (1 + _WINDOW) * start_rad_s)
     omega = near.angular_rad_s
     if len(omega) < _FEWEST:
@@ -223,8 +223,8 @@ def _pair(data: Collocated, start_rad_s: float, sign: float) -> Landmark:
 class _Local:
     """A pair of zeros (sign 1) or poles (-1) with smooth surroundings, which are projected out.
 
-    Unknowns: frequency and damping ratio. Lines are weighted by noise relative to the measured
-    response, until ``weigh``.
+    Unknowns are frequency and damping ratio. Until a call of ``weigh``, weights come from noise
+    relative to the measured response.
     """
 
     def __init__(self, data: Collocated, start_rad_s: float, sign: float) -> None:
@@ -242,7 +242,7 @@ class _Local:
         self._smooth, self._mix = np.linalg.qr(self._shape * self._weight[:, None])
 
     def _free(self, values: Complex) -> Real:
-        """What the surroundings cannot take up, weighted, real and imaginary parts."""
+        """Return the weighted part that the surroundings cannot explain, real, then imaginary parts."""
         left = values * self._weight
         left = left - self._smooth @ (self._smooth.T @ left)
         return np.concatenate([left.real, left.imag])
@@ -252,32 +252,32 @@ class _Local:
         return np.asarray(theta[0] ** 2 - omega**2 + 2j * theta[1] * theta[0] * omega)
 
     def _rest(self, theta: Real) -> Complex:
-        """The logarithm of the response without the pair."""
+        """Return the logarithm of the response without the pair."""
         factor = self._pair(theta)
         phase = np.unwrap(np.angle(factor))
         return np.asarray(self._log - self._sign * (np.log(np.abs(factor)) + 1j * phase))
 
     def residual(self, theta: Real) -> Real:
-        """Weighted errors."""
+        """Return the weighted errors."""
         return self._free(self._rest(theta))
 
     def slope(self, theta: Real) -> Real:
-        """Derivatives of the residuals by frequency and damping, (2 n, 2)."""
+        """Return the derivatives of the residuals by frequency and damping, (2 n, 2)."""
         factor = self._pair(theta)
         by_frequency = (2 * theta[0] + 2j * theta[1] * self._omega) / factor
         by_damping = 2j * theta[0] * self._omega / factor
         return -self._sign * np.stack([self._free(by_frequency), self._free(by_damping)], axis=1)
 
     def modelled(self, theta: Real) -> Complex:
-        """Response of pair and surroundings."""
+        """Return the response of pair and surroundings."""
         weighted = self._smooth.T @ (self._rest(theta) * self._weight)
         around = self._shape @ np.linalg.solve(self._mix, weighted)
         return np.asarray(self._pair(theta) ** self._sign * np.exp(around))
 
     def standard_errors(self, theta: Real, modelled: Complex) -> Real:
-        """Standard errors of frequency and damping, (2,)."""
+        """Return the standard errors of frequency and damping, (2,)."""
         noise = self._weight**2 * self._data.noise(modelled)
-        # The surroundings take from the residuals too.
+        # The surroundings also absorb part of the residuals.
         around = scipy.linalg.block_diag(self._smooth, self._smooth)
         slope = np.hstack([self.slope(theta), around])
         return standard_errors(slope, self.residual(theta), noise)[:2]

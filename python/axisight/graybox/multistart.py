@@ -27,18 +27,19 @@ from axisight.statistics.starts import StartRange, drawn_start
 class AxisMultistart:
     """Result of `multistart_axis`.
 
-    ``best`` is the fit of the lowest loss. ``runs`` is a Dataset over ``run`` with ``start`` and
-    ``value`` (run, parameter), ``loss``, ``status`` and ``iterations``; a run whose start cannot
-    be simulated has the status ``diverged`` and the loss infinity.
+    ``best`` is the fit with the lowest loss. ``runs`` is a Dataset over ``run`` with ``start`` and
+    ``value`` (run, parameter), ``loss``, ``status`` and ``iterations``. A run whose start cannot
+    be simulated has the status ``diverged`` and an infinite loss.
     """
 
     best: AxisFit
     runs: xr.Dataset
 
     def success_rate(self, truth: Mapping[str, float], within: float) -> float:
-        """Return the share of all starts that end within a relative distance of ``truth``.
+        """Return the share of all starts that end within the relative distance ``within`` of ``truth``.
 
-        Every start counts, those that diverged too. ``truth`` names the parameters compared.
+        All starts count, including diverged ones. ``truth`` holds the parameters to compare. Raises
+        InputError for unknown names.
         """
         unknown = sorted(set(truth) - set(self.runs.parameter.values.tolist()))
         if unknown or not truth:
@@ -65,15 +66,16 @@ def multistart_axis(
     settings: FitSettings | None = None,
     threads: int = 0,
 ) -> AxisMultistart:
-    """Fit an axis from ``n_starts`` random starts by output error; each start is one fit.
+    """Fit an axis by output error from ``n_starts`` random starts, and return the best fit and all runs.
 
-    Every free parameter is drawn on its own, evenly in its logarithm, from ``start / spread``
-    to ``start * spread``, or between the limits that ``ranges`` gives by name (both positive
-    or both negative); one that starts at zero without a range stays there. Draws are clipped to
-    the bounds. The draws are a function of (seed, number of the run) alone, and the result does
-    not depend on ``threads`` (0 takes every core).
+    Every free parameter is drawn independently and uniformly in its logarithm, from
+    ``start / spread`` to ``start * spread`` or between its limits in ``ranges`` (both positive or both
+    negative). A parameter that starts at zero without a range starts at zero in every run. Draws are
+    clipped to the bounds. They depend only on (seed, number of the run), and the result does not
+    depend on ``threads`` (0 takes every core).
 
-    ``fixed``, ``bounds``, ``settings`` and errors are as in `fit_axis`.
+    ``model``, ``data_sets``, ``fixed``, ``bounds``, ``settings`` and errors are those of `fit_axis`.
+    Also raises InputError if the motion diverges from every start.
     """
     chosen = settings or FitSettings()
     for field, value, least in (
@@ -140,7 +142,7 @@ def _ranges(
     spread: float,
     ranges: Mapping[str, tuple[float, float]],
 ) -> list[StartRange | None]:
-    """Return where the free parameters are drawn; None for those that start at zero."""
+    """Return the ranges of the free parameters, None for those that start at zero."""
     unknown = sorted(set(ranges) - set(task.free_names))
     if unknown:
         raise InputError(

@@ -14,18 +14,18 @@ Array = NDArray[np.float64]
 
 
 def estimate_filter(parts: Sequence[Array], order: int | None, most: int) -> Array:
-    """Return a_1..a_p of ``A(q) = 1 + a_1 q^-1 + ...``, which whitens all parts alike.
+    """Return a_1..a_p of ``A(q) = 1 + a_1 q^-1 + ...``, one whitening filter for all parts.
 
-    Yule-Walker equations on the mean autocovariance, whose solution is always stable and
-    minimum phase. Without an ``order`` the one of the smallest Akaike criterion
-    ``n log(variance) + 2 p`` up to ``most`` is taken.
+    It solves the Yule-Walker equations on the mean autocovariance, whose solution is always stable
+    and minimum phase. Without ``order`` it takes the order up to ``most`` with the smallest Akaike
+    criterion ``n log(variance) + 2 p``.
     """
     count = sum(len(p) for p in parts)
     most = min(most if order is None else order, min(len(p) for p in parts) - 1, count // 10)
     covariance = pooled_autocovariance(parts, most) / count
     if covariance[0] <= 0 or most < 1:
         return np.zeros(0)
-    # What the records cannot resolve must not decide: a floor of white noise at rounding.
+    # A floor of white noise at rounding level keeps rounding errors from deciding the filter.
     covariance[0] *= 1 + 1e-10
 
     def solved(p: int) -> tuple[Array, float]:

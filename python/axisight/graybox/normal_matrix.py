@@ -1,4 +1,4 @@
-"""Inverse of the normal matrix of least squares, with what data do not show left unknown."""
+"""Inverse of the normal matrix of least squares, infinite for parameters that data do not show."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 def inverse_normal(matrix: Array) -> tuple[Array, float]:
     """Return the inverse of a normal matrix and its condition number when scaled to unit diagonal.
 
-    Infinite among parameters that the data do not show, as is then the condition.
+    The inverse is infinite for parameters that the data do not show; the condition is then infinite.
     """
     inverse, condition, blind = pseudo_inverse(matrix)
     inverse[np.ix_(blind, blind)] = np.inf
@@ -21,15 +21,15 @@ def inverse_normal(matrix: Array) -> tuple[Array, float]:
 def pseudo_inverse(matrix: Array) -> tuple[Array, float, NDArray[np.bool_]]:
     """Return the pseudo-inverse, the condition number, and which parameters data do not show.
 
-    Directions count as not shown by the matrix scaled to unit diagonal; the condition is then
-    infinite. A matrix that is not finite, where a model all but diverges, shows nothing.
+    The matrix scaled to unit diagonal decides which directions the data show; if any is missing, the
+    condition is infinite. A matrix that is not finite, from a model that nearly diverges, shows none.
     """
     root, condition, blind = pseudo_root(matrix)
     return root @ root.T, condition, blind
 
 
 def pseudo_root(matrix: Array) -> tuple[Array, float, NDArray[np.bool_]]:
-    """Return W with ``W W^T`` the pseudo-inverse, and the others as `pseudo_inverse` does."""
+    """Return W with ``W W^T`` the pseudo-inverse, and condition and parameters of `pseudo_inverse`."""
     if not np.isfinite(matrix).all():
         return np.full_like(matrix, np.inf), np.inf, np.ones(len(matrix), bool)
     size = np.sqrt(np.diag(matrix))

@@ -33,11 +33,11 @@ from axisight.graybox.normal_matrix import inverse_normal
 
 NoiseKind = Literal["output_error", "innovations", "ar"]
 
-# Where the search for the innovations gains starts.
+# Start of the search for the innovations gains.
 FIRST_GAIN = 0.02
-# Standard errors by which parameters may still move when the noise filter is estimated again.
+# Parameters and noise filter agree if a new filter moves parameters by less than this [standard errors].
 AGREED = 0.05
-# Refits with weights from the residuals, and the relative change at which these stay.
+# Most refits with weights from the residuals, and the relative change at which they end.
 WEIGHT_ROUNDS = 10
 SAME_WEIGHT = 0.01
 
@@ -54,44 +54,47 @@ def fit_axis(
     weights: Literal["given", "residuals"] = "given",
     settings: FitSettings | None = None,
 ) -> AxisFit:
-    """Fit the parameters of an axis to records, all at once, by their prediction errors.
+    """Fit the parameters of an axis to all records together, by their prediction errors.
 
     Parameters
     ----------
-    model : structure.
-    data_sets : one or more records, of any lengths and sample times; each is simulated on its
-        own and their squared errors are added with their weights.
-    start : where the search starts, by name (`AxisModel.parameters`); what is left out starts
-        where it changes nothing, for instance ``d`` at 0.
+    model : structure of the axis.
+    data_sets : one or more records, of any lengths and sample times. Each is simulated on its own;
+        the loss is the weighted sum of their squared errors.
+    start : start of the search by name (`AxisModel.parameters`). Parameters left out start at their
+        neutral value, for instance ``d`` at 0.
     fixed : names of parameters kept at their start.
-    bounds : (lower, upper) by name, in place of the defaults (inertias, stiffnesses, dampings
+    bounds : (lower, upper) by name, instead of the defaults (inertias, stiffnesses, dampings
         and frictions are not negative).
     free_gear_ratio : estimate ``r`` too. Motor-side data show r only together with ``J_a``,
-        ``k1``, ``d`` (all scale by 1/r^2): fix one of these.
-    noise_model : what the prediction error is taken to be.
+        ``k1``, ``d`` (all scale by 1/r^2), so fix one of these.
+    noise_model : assumption on the prediction error.
 
-        ``"output_error"``: the model is simulated with the measured torque alone and what is
-        left is white noise on the output (thesis 9.2-9.3). Unbiased in closed loop only if
-        that is so: torque that is not modelled is integrated into slowly varying errors that
-        the feedback correlates with the input.
-        ``"innovations"``: a constant observer gain K on the output error, (3.33), estimated
-        with the parameters, so that low-frequency torque errors are followed, not explained.
-        ``"ar"``: the residuals of the output error are whitened by an autoregressive filter,
-        H = 1/A(q), estimated from them, and the fit is repeated until both agree.
-    weights : ``"given"`` takes those of the records. ``"residuals"`` estimates them, one over the
-        variance of each record's residuals, and refits until they no longer change: right where
-        noise differs between records, wrong where one of them shows an effect the model lacks.
-    settings : tolerances and the like.
+        ``"output_error"``: the measured torque alone drives the model, and the error is white noise on
+        the output (thesis 9.2-9.3). In closed loop the fit is biased if that does not hold: the plant
+        integrates torque errors into slow output errors, which feedback correlates with the input.
+        ``"innovations"``: a constant observer gain K on the output error, (3.33), is estimated with
+        the parameters. The observer then follows low-frequency torque errors.
+        ``"ar"``: an autoregressive filter H = 1/A(q) whitens the residuals of the output error. It is
+        estimated from them, and the fit is repeated until both agree.
+    weights : ``"given"`` takes those of the records. ``"residuals"`` takes one over the variance of
+        each record's residuals, and refits until the weights no longer change. Use it if noise differs
+        between records, but not if one record shows an effect that the model lacks.
+    settings : tolerances and limits of the search.
 
     Returns
     -------
     `AxisFit`: parameters, uncertainty, status and warnings in words.
 
-    Raises InputError for misuse: missing or unknown names, a start outside its bounds, nothing
-    left to fit, data of the wrong kind, records in which the axis gives more energy than it
-    got (a sign is wrong) or that begin in motion although the model starts at rest, and a start
-    from which the simulation diverges. A search that does
-    not converge is told in ``status`` and ``warnings``.
+    Raises InputError for misuse:
+
+    - missing or unknown names, a start outside its bounds, no parameter left to fit
+    - data of the wrong kind
+    - records in which the axis returns more energy than it got, because a sign is wrong
+    - records that begin in motion although the model starts at rest
+    - a start from which the simulation diverges
+
+    ``status`` and ``warnings`` tell if a search does not converge.
 
     """
     task, values = prepare(
@@ -139,7 +142,7 @@ def prepare(
     free_gear_ratio: bool,
     settings: FitSettings,
 ) -> tuple[Task, dict[str, float]]:
-    """Check the arguments of a fit; return the task and all starting values."""
+    """Return the task and all starting values, after a check of the arguments of a fit."""
     data = check_data(model, data_sets)
     held = {fixed} if isinstance(fixed, str) else set(fixed)
     for argument, names in (("fixed", held), ("bounds", set(bounds or {})), ("start", set(start))):
@@ -178,7 +181,7 @@ def _interval(name: str, pair: tuple[float, float]) -> tuple[float, float]:
 
 
 def _with_noise(task: Task, point: Point, kind: NoiseKind, token: _core.CancelToken) -> Point:
-    """Refit with the noise model, from the end of an output-error fit."""
+    """Return the refit with the noise model, from the end of an output-error fit."""
     if kind == "innovations":
         gains = point.gains or rigid_gains(task.model, task.start["r"], FIRST_GAIN)
         return search(task, replace(point, gains=gains, predicts=True, free_gains=True), token)
@@ -188,7 +191,7 @@ def _with_noise(task: Task, point: Point, kind: NoiseKind, token: _core.CancelTo
 def _reweighted(
     task: Task, point: Point, kind: NoiseKind, token: _core.CancelToken
 ) -> tuple[Task, Point, tuple[str, ...]]:
-    """Refit with weights one over the variance of the residuals until they stay."""
+    """Return the refit whose weights, one over the variance of the residuals, no longer change."""
     lengths = np.cumsum([len(d) for d in task.data])[:-1]
     for _ in range(WEIGHT_ROUNDS):
         old = np.array([d.weight for d in task.data])
@@ -207,9 +210,9 @@ def _reweighted(
 
 
 def _whitened(task: Task, point: Point, token: _core.CancelToken) -> Point:
-    """Refit with the residuals whitened until neither parameters nor filter change.
+    """Return the refit with whitened residuals at which neither parameters nor filter change.
 
-    What did not agree after all rounds has the status ``noise_rounds``.
+    If they still change after all rounds, the status is ``noise_rounds``.
     """
     places = free_places(task, point)
     for _ in range(task.settings.ar_rounds):
@@ -222,7 +225,7 @@ def _whitened(task: Task, point: Point, token: _core.CancelToken) -> Point:
         before = np.array(point.theta)[places]
         same_order = len(whitening) == len(point.whitening)
         if not (whitening or point.whitening):
-            return point  # white already
+            return point  # the residuals are white without a filter
         point = search(task, replace(point, whitening=whitening), token)
         inverse, _ = inverse_normal(point.matrix)
         size = np.sqrt(error_variance(task, point) * np.diag(inverse))

@@ -27,7 +27,7 @@ from axisight.logs import Log
 Real = NDArray[np.float64]
 
 _LAG_S = 0.005
-"""Spacing of the lags of residual tests: a robot's motion has little beyond 100 Hz."""
+"""Spacing of the lags of residual tests [s]; a robot's motion has little power above 100 Hz."""
 
 
 @summarized
@@ -36,15 +36,15 @@ class AxisIdentification:
     """Result of :func:`identify_axis`: the values of each step.
 
     model
-        Structure.
+        Structure of the axis.
     data_sets
-        What was fitted: the low-frequency record, then the broadband ones.
+        Fitted records: the low-frequency one, then the broadband ones.
     initial
-        Steps 1 and 2.
+        Result of steps 1 and 2.
     fit
-        Step 3.
+        Result of step 3.
     initial_fit_percent
-        Fit (3.54) of the initial model, one for each of ``data_sets``; those of step 3 are
+        Fit (3.54) of the initial model to each of ``data_sets`` [%]; that of step 3 is
         ``fit.fit_percent``.
     tests
         Residual tests of step 3, one for each of ``data_sets``.
@@ -58,7 +58,7 @@ class AxisIdentification:
     tests: tuple[ResidualTests, ...]
 
     def _repr_html_(self) -> str:
-        """Values of step 3 and how well each record is explained, for notebooks."""
+        """Return the values of step 3 and the fit to each record, for notebooks."""
         columns = (self.initial_fit_percent, self.fit.fit_percent)
         fits = zip(*(map(html.number, column) for column in columns), strict=True)
         names = [data.name for data in self.data_sets]
@@ -99,24 +99,24 @@ def identify_axis(
     notch_band_hz: tuple[float, float] | None = None,
     plateau_from_hz: float | None = None,
 ) -> AxisIdentification:
-    """Identify one axis from motor-side records: rigid body, friction, flexibility.
+    """Identify rigid body, friction and flexibility of one axis from motor-side records.
 
-    Wernholt (2004), section 9.3: step 1 and 2 give a start (:func:`initial_model`), step 3 fits
-    all records at once by their prediction errors (:func:`fit_axis`), then the residuals are
-    tested (:func:`residual_tests`), against the reference where logs have one, else the torque.
+    Wernholt (2004), section 9.3. Steps 1 and 2 give a start (:func:`initial_model`). Step 3 fits
+    all records together by their prediction errors (:func:`fit_axis`). Residual tests follow
+    (:func:`residual_tests`), against the reference of logs or else against the torque.
 
     Parameters
     ----------
     rigid : low-frequency motion in both directions, from rest.
     broadband : periodic records of several periods, from rest, of different amplitudes.
     gear_ratio : r, joint angle per motor angle.
-    axis : of logs, from 1.
+    axis : axis of the logs, from 1.
     model : structure of step 3; default two masses with a cubic gear spring, Coulomb friction
         and the backward difference of the position as output.
-    initial : start here instead of from steps 1 and 2.
-    fixed, bounds, noise_model, settings : of :func:`fit_axis`.
-    closed_loop : whether a controller was at work, for the residual tests.
-    period_s, lines, drop_periods, cutoff_hz, notch_band_hz, plateau_from_hz : of
+    initial : start of step 3, instead of steps 1 and 2.
+    fixed, bounds, noise_model, settings : arguments of :func:`fit_axis`.
+    closed_loop : whether a controller was active, for the residual tests.
+    period_s, lines, drop_periods, cutoff_hz, notch_band_hz, plateau_from_hz : arguments of
         :func:`initial_model`.
 
     Raises InputError as the three steps do.
@@ -169,7 +169,7 @@ def identify_axis(
 def _tests(
     residual: Real, data: AxisData, reference: Real | None, closed_loop: bool
 ) -> ResidualTests:
-    """Test against the reference, which nothing feeds back into, or else the torque."""
+    """Return tests against the reference, which has no feedback, or else against the torque."""
     step = max(1, round(_LAG_S / data.sample_time_s))
     signal = np.asarray(data.torque_nm) if reference is None else reference
     return residual_tests(

@@ -22,7 +22,7 @@ def report(
 ) -> str:
     """Return the values of each step, fits, tests and findings.
 
-    ``names`` are those of the data sets, the low-frequency one first; the rest is as in
+    ``names`` are those of the data sets, the low-frequency one first. The other arguments are those of
     `AxisIdentification`.
     """
     lines = [*_step_one(initial.rigid), ""]

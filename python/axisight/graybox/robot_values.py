@@ -23,7 +23,7 @@ from axisight.robot_file.values import noted, values_of
 Array = NDArray[np.float64]
 Covariance = Literal["trusted", "sandwich", "white"]
 
-# Thesis name: quantity of the robot file.
+# Quantity of the robot file by thesis name.
 QUANTITIES = {
     "J_m": "motor_inertia",
     "F_v": "viscous_friction",
@@ -31,8 +31,8 @@ QUANTITIES = {
     "d": "damping",
 }
 EXACT_SIGN_SMOOTHING_RAD_S = 0.01
-"""What effects take for a sign that the fit followed exactly, as the preset of the thesis does."""
-# What a fitted axis stands for, of what absorbs effects.
+"""Smoothing of effects for a fit with the exact sign of friction, as in the preset of the thesis."""
+# Quantities that a fitted axis replaces, so that the robot's own effects on them are removed.
 STANDS_FOR = (
     "motor_inertia",
     "viscous_friction",
@@ -65,37 +65,38 @@ def identified_axis(
     ``F_c``; ``F_s``, ``v_s`` effect ``coulomb_friction``, or with ``F_s`` ``stribeck_friction``
     ``b``, ``u_0``            effects ``backlash``, ``torque_offset``
     ``a_n``, ``b_n``          effect ``torque_ripple``, up to three orders
-    ``J_a``, ``J_a2`` ...     none: a chain holds the inertia of an arm in all links beyond
-    ``k1_2``, ``d_2`` ...     none: which elastic joint they mean cannot be told from one axis
+    ``J_a``, ``J_a2`` ...     none: the inertia of an arm belongs to all links beyond the joint
+    ``k1_2``, ``d_2`` ...     none: one axis does not tell which elastic joint they belong to
     ``F_a``, ``r``            none
     ========================= ==================================================================
 
-    What has no place stands with unit and standard error under ``"no_place"`` of the provenance's
-    settings, and the notes say so; for the inertia of the arm they give what the robot has
-    about the joint at its operating point. Warnings of the fit and its status are notes too.
+    The provenance's settings hold values without a place in the file under ``"no_place"``, with unit
+    and standard error, and the notes name them. For the inertia of the arm the notes also give the
+    robot's inertia about the joint at its operating point. Warnings and status of the fit are notes
+    too.
 
     fit
-        Two to four masses. Motor-side data determine an axis up to the gear ratio: if its own is
-        another than the robot's (1, or a fitted ``r``), joint-side values are converted to
-        the robot's, k1, d, J_a by (r_fit / r_robot)^2, k3 by the fourth power, b by the inverse:
-        the motor moves alike.
+        A fit of two to four masses. Motor-side data determine an axis up to the gear ratio. If the
+        fit's ratio (1, or a fitted ``r``) differs from the robot's, joint-side values are converted
+        so that the motor moves alike: k1, d, J_a by (r_fit / r_robot)^2, k3 by the fourth power, b by
+        the inverse.
     robot
-        Where they will be written. Effects of friction and gear of the axis that it has already
-        and the fit has not are removed: the fit stands in their place.
+        The robot to which the values will be written. The fit replaces its friction and gear effects
+        at the axis, so those that the fit does not have are removed.
     provenance
-        Where they come from.
+        Source of the values.
     axis
         Number of the axis from 1, or the name of its joint.
     covariance
-        Which one of the fit: ``"trusted"`` (by its ``trusted``), ``"sandwich"`` or ``"white"``; to
-        first order through the conversion. The sandwich of few blocks is unknown, and so are
-        then standard errors. The notes say which. Held values are written if the robot has others,
-        standard error zero, and noted.
+        Covariance of the fit to use: ``"trusted"`` (named by its ``trusted``), ``"sandwich"`` or
+        ``"white"``, converted to first order. A sandwich of few blocks is unknown, and standard errors
+        are then unknown too. The notes name the covariance. A value held in the fit is written, with
+        standard error zero and a note, if it differs from the robot's.
     smoothing_rad_s
-        Width [rad/s] over which friction effects smooth the sign; by default that of the model,
-        0.01 rad/s where the model follows the sign exactly.
+        Width [rad/s] over which friction effects smooth the sign; by default that of the model, or
+        0.01 rad/s for a model with the exact sign.
 
-    Raises InputError for another type, an axis that is not there or has a rigid transmission, and
+    Raises InputError for another type, an axis that does not exist or has a rigid transmission, and
     a width that is not positive.
     """
     if not isinstance(fit, AxisFit):
@@ -126,7 +127,7 @@ def identified_axis(
 
 
 def _spread(fit: AxisFit, covariance: Covariance) -> tuple[Array, str]:
-    """Covariance of the free parameters and words about its kind."""
+    """Return the covariance of the free parameters, and a note on its kind."""
     if covariance not in ("trusted", "sandwich", "white"):
         raise InputError(f"covariance: expected trusted, sandwich or white, got {covariance!r}")
     kind = fit.trusted if covariance == "trusted" else covariance
@@ -150,7 +151,7 @@ def _places(
     slopes: Mapping[str, Array],
     owner: Mapping[str, str],
 ) -> tuple[dict[str, str], list[str]]:
-    """Full name in the robot file by thesis name of what is written, and which of it was held."""
+    """Return the robot-file names of written values by thesis name, and the names of held values."""
     present = robot_parameters(robot)
     names: dict[str, str] = {}
     held = []
@@ -167,12 +168,12 @@ def _places(
 
 
 def _same_ratio(own: float, ratio: float) -> bool:
-    """Whether two gear ratios differ by rounding only; they are small, 1/200 and the like."""
+    """Return whether two gear ratios differ by rounding only, relative to their small size."""
     return bool(np.isclose(own, ratio, rtol=1e-12, atol=0.0))
 
 
 def joint_of(robot: Robot, axis: int | str) -> tuple[str, float]:
-    """Return the name of the joint of an axis and the size of its gear ratio."""
+    """Return the joint name of an axis and the size of its gear ratio; raises InputError without spring."""
     axis = robot.axis_number(axis)
     joint = robot.axis_names[axis - 1]
     if f"{joint}.stiffness" not in robot_parameters(robot):
@@ -192,7 +193,7 @@ def _width(fit: AxisFit, given: float | None) -> float:
 
 
 def _power(name: str) -> int:
-    """Power of the gear ratio that leaves the motor's motion as it is."""
+    """Return the power of the gear ratio that keeps the motor's motion unchanged."""
     if name == "b":
         return -1
     if name.startswith("k3"):
@@ -201,7 +202,7 @@ def _power(name: str) -> int:
 
 
 def converted(fit: AxisFit, ratio: float) -> tuple[dict[str, float], dict[str, Array]]:
-    """All values for the gear ratio of the robot, and derivatives (n_free,) by the free ones."""
+    """Return all values for the robot's gear ratio, and their derivatives (n_free,) by the free ones."""
     own = fit.parameters["r"]
     values, slopes = {}, {}
     for name, value in fit.parameters.items():
@@ -220,7 +221,7 @@ def converted(fit: AxisFit, ratio: float) -> tuple[dict[str, float], dict[str, A
 def _effects(
     fit: AxisFit, values: Mapping[str, float], axis: int, width: float
 ) -> tuple[list[Effect], dict[str, str]]:
-    """Effects of the fit, and the full name of the effect parameter by its thesis name."""
+    """Return the effects of the fit, and the full names of effect parameters by thesis name."""
     table = of_axis_fit(
         stribeck=fit.model.stribeck,
         ripple_orders=fit.model.ripple_orders,
@@ -246,7 +247,7 @@ def _unplaced(
     spread: Array,
     placed: set[str],
 ) -> dict[str, Any]:
-    """What has no place: value for the gear ratio of the robot, standard error, unit, meaning."""
+    """Return values without a place in the file, for the robot's gear ratio, with error, unit, meaning."""
     out: dict[str, Any] = {}
     for p in fit.model.parameters:
         free = p.name in fit.free
@@ -284,7 +285,7 @@ def _notes(
 
 
 def inertia_about(robot: Robot, joint: str) -> float:
-    """Inertia of all links beyond a joint at the operating point [kg m^2]."""
+    """Return the inertia of all links beyond a joint at the operating point [kg m^2]."""
     q = np.zeros(robot.n_joints)
     q[robot.axis_joints] = robot.operating_point
     place = robot.joint_names.index(joint)

@@ -1,4 +1,4 @@
-"""How much the fit depends on each parameter."""
+"""Sensitivity of the fit to each parameter."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def sensitivity_table(
     change: float = 0.2,
     names: tuple[str, ...] | None = None,
 ) -> xr.DataArray:
-    """Return by how much the fit changes when single parameters do: Table 9.3.
+    """Return the change of the fit when single parameters change, as in Table 9.3.
 
-    Each parameter is multiplied by 1 + ``change`` and 1 - ``change``, one at a time, the
-    others held. Near the best model the loss of fit grows with the square of the change and is
-    weighed against whatever else the model misses; a small entry therefore does not mean that the
-    parameter is poorly known. Its standard error says that.
+    The function multiplies one parameter at a time by 1 + ``change`` and 1 - ``change``, and holds the
+    others. Near the best model the loss of fit grows with the square of the change, and other model
+    errors hide part of it. A small entry therefore does not mean that the parameter is poorly known;
+    its standard error tells that.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def sensitivity_table(
     data_sets, simulate, measured : as for :func:`axisight.graybox.cross_validation`, with the
         parameters in place of the model.
     change : relative, between 0 and 1.
-    names : which parameters; default all that are not zero.
+    names : parameters to change; default all that are not zero.
 
     Returns differences of (3.54) in per cent points, dims (parameter, change, data_set), with the
     fit itself in ``attrs["fit_percent"]``. Raises InputError for unknown names, a

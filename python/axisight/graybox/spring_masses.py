@@ -1,9 +1,9 @@
 """Chains of masses and springs from the poles and zeros of their collocated response.
 
-An inverse eigenvalue problem: a free chain of n masses has n - 1 resonances, and n - 1 notches
-where torque and motion are those of the first mass. They determine its Jacobi matrix, and with
-one inertia all masses and springs (Gantmacher and Krein 1950; Gladwell 2004, Inverse Problems in
-Vibration, chapters 3 and 4; for robots Berglund and Hovland 2000, thesis section 4.4).
+This is an inverse eigenvalue problem. A free chain of n masses has n - 1 resonances, and its response
+at the first mass has n - 1 notches. They determine its Jacobi matrix, and together with one inertia
+all masses and springs (Gantmacher and Krein 1950; Gladwell 2004, Inverse Problems in Vibration,
+chapters 3 and 4; for robots Berglund and Hovland 2000, thesis section 4.4).
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ Complex = NDArray[np.complex128]
 @summarized
 @dataclass(frozen=True, eq=False)
 class SpringMassChain:
-    """Masses in a row, neighbours joined by spring and damper, both ends free.
+    """A chain of masses, with spring and damper between neighbours and two free ends.
 
-    The motor is the first mass. Everything is on the joint side of the gear; a gear ratio r
+    The motor is the first mass. All values are on the joint side of the gear. The gear ratio r
     (joint angle per motor angle) gives ``motor_inertia_kg_m2 = r^2 inertia_kg_m2[0]`` and the
     response on the motor side.
 
     inertia_kg_m2
         (n,), positive.
     stiffness_nm_rad, damping_nm_s_rad
-        Of the n - 1 springs, positive, and dampers, not negative.
+        (n - 1,), springs, positive, and dampers, not negative.
     gear_ratio
         r.
 
@@ -47,7 +47,7 @@ class SpringMassChain:
     gear_ratio: float = 1.0
 
     def __post_init__(self) -> None:
-        """Check everything."""
+        """Check all fields."""
         n = np.size(self.inertia_kg_m2)
         sizes = {"inertia_kg_m2": n, "stiffness_nm_rad": n - 1, "damping_nm_s_rad": n - 1}
         if n < 2:
@@ -71,7 +71,7 @@ class SpringMassChain:
 
     @property
     def motor_inertia_kg_m2(self) -> float:
-        """The first mass as the motor sees it, r^2 times its inertia on the joint side."""
+        """Inertia of the first mass on the motor side, r^2 times that on the joint side."""
         return float(self.gear_ratio**2 * self.inertia_kg_m2[0])
 
     @cached_property
@@ -95,19 +95,22 @@ class SpringMassChain:
         return np.asarray(self._natural(1)[1] @ self.damping_nm_s_rad / (2 * self.zeros_rad_s))
 
     def _natural(self, held: int) -> tuple[Real, Real]:
-        """Frequencies, and modal damping 2 zeta w per unit of each damper, first masses held."""
+        """Return natural frequencies, and modal damping 2 zeta w per unit of each damper.
+
+        The first ``held`` masses (0 or 1) are held.
+        """
         stretch = _stretch(self.n_masses)[:, held:]
         root = np.sqrt(self.inertia_kg_m2[held:])
         scaled = stretch / root
         values, vectors = np.linalg.eigh(scaled.T @ (self.stiffness_nm_rad[:, None] * scaled))
-        start = 1 - held  # the free chain turns as a whole at zero frequency
+        start = 1 - held  # skips the rigid motion of the free chain
         modal = (scaled @ vectors[:, start:]) ** 2
         return np.sqrt(values[start:]), np.ascontiguousarray(modal.T)
 
     def acceleration_response(self, frequency_hz: ArrayLike) -> Complex:
-        """Return motor torque to motor acceleration [rad/s^2/Nm] at frequencies [Hz], damped."""
+        """Return the damped response from motor torque to acceleration [rad/s^2/Nm] at frequencies [Hz]."""
         s = 2j * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
-        # From the free end to the motor: what the rest of the chain adds to a mass.
+        # Eliminates masses from the free end, so that each step adds the rest of the chain as a load.
         load = np.zeros(len(s), np.complex128)
         for i in range(self.n_masses - 1, 0, -1):
             body = s**2 * self.inertia_kg_m2[i] + load
@@ -133,23 +136,23 @@ def reconstruct_chain(
 
         phi'' / tau = (1 / J_m) prod (s^2 + z_i^2) / prod (s^2 + p_i^2).
 
-    Its partial fractions over ``-s^2`` have as weights the squares of the first components of
-    the eigenvectors of ``M^-1/2 K M^-1/2``; Lanczos' recursion on the poles from that vector
-    gives the tridiagonal matrix, and the rigid motion, in which no spring works, the masses.
+    The weights of its partial fractions over ``-s^2`` are the squares of the first components of the
+    eigenvectors of ``M^-1/2 K M^-1/2``. Lanczos' recursion on the poles from these components gives
+    the tridiagonal matrix. The rigid motion, which deflects no spring, gives the masses.
 
     Parameters
     ----------
     poles_rad_s, zeros_rad_s : n - 1 each, ascending, undamped [rad/s], alternating:
         ``0 < z_1 < p_1 < z_2 < p_2 < ...``.
-    motor_inertia_kg_m2 : J_m on the motor side, the inverse of the high-frequency gain; or
-    rigid_inertia_kg_m2 : that of the whole axis on the motor side, as step 1 finds it. Give
-        exactly one; the other follows, ``J_m / J = prod z^2 / prod p^2``.
+    motor_inertia_kg_m2 : J_m on the motor side, the inverse of the high-frequency gain.
+    rigid_inertia_kg_m2 : J of the whole axis on the motor side, from step 1. Give exactly one of both
+        inertias; the other follows from ``J_m / J = prod z^2 / prod p^2``.
     gear_ratio : r, joint angle per motor angle.
-    pole_damping, zero_damping : damping ratios, (n - 1,) each. The dampers, none negative, are
-        those whose modal damping is nearest in least squares; to first order in the
-        damping. Without them the chain is undamped.
+    pole_damping, zero_damping : damping ratios, (n - 1,) each. The dampers are the non-negative
+        least-squares fit to this modal damping, to first order in the damping. Without both
+        arguments the chain is undamped.
 
-    Raises InputError naming the field, for poles and zeros that no chain has too.
+    Raises InputError naming the field, also for poles and zeros that no chain has.
 
     """
     poles, zeros = (
@@ -161,7 +164,7 @@ def reconstruct_chain(
     first = _motor_inertia(poles, zeros, motor_inertia_kg_m2, rigid_inertia_kg_m2)
     if not (np.isfinite(gear_ratio) and gear_ratio != 0):
         raise InputError(f"gear_ratio: expected a finite number other than zero, got {gear_ratio}")
-    # Frequencies relative to the highest pole: the recursion then works with numbers near one.
+    # Relative to the highest pole, the recursion works with numbers near one.
     scale = poles[-1]
     free = np.concatenate([[0.0], poles / scale])
     off, rigid = _lanczos(free**2, _weights(free, zeros / scale))
@@ -176,7 +179,7 @@ def reconstruct_chain(
 
 
 def _stretch(n: int) -> Real:
-    """Deflections of the springs per angle of the masses, (n - 1, n)."""
+    """Return the deflections of the springs per angle of the masses, (n - 1, n)."""
     return np.asarray(np.eye(n - 1, n) - np.eye(n - 1, n, k=1))
 
 
@@ -211,21 +214,21 @@ def _motor_inertia(poles: Real, zeros: Real, motor: float | None, rigid: float |
 
 
 def _weights(poles: Real, zeros: Real) -> Real:
-    """Residues of the response in partial fractions over the squared poles; they add up to one."""
+    """Return the residues of the partial fractions over the squared poles, which sum to one."""
 
     def apart(others: Real) -> Real:
-        # A difference of squares as a product: near pairs lose no digits.
+        # The product form of a difference of squares loses no digits for near pairs.
         return np.abs((poles[:, None] - others) * (poles[:, None] + others))
 
     among = apart(poles)[~np.eye(len(poles), dtype=bool)].reshape(len(poles), -1)
-    # Quotients in order of size, so that no product under- or overflows.
+    # Sorted quotients keep the product from under- or overflow.
     return np.asarray((np.sort(apart(zeros), axis=1) / np.sort(among, axis=1)).prod(axis=1))
 
 
 def _lanczos(values: Real, weights: Real) -> tuple[Real, Real]:
-    """Off-diagonal of the Jacobi matrix of these eigenvalues and weights, and its first eigenvector.
+    """Return the off-diagonal of the Jacobi matrix with these eigenvalues and weights, and its eigenvector 1.
 
-    The first eigenvalue is zero, its vector the rigid motion.
+    The first eigenvalue is zero, and its eigenvector is the rigid motion.
     """
     n = len(values)
     basis = np.zeros((n, n))
@@ -233,7 +236,7 @@ def _lanczos(values: Real, weights: Real) -> tuple[Real, Real]:
     basis[:, 0] = np.sqrt(weights / weights.sum())
     for j in range(n - 1):
         v = values * basis[:, j]
-        for _ in range(2):  # orthogonal to rounding only after the second time
+        for _ in range(2):  # one pass leaves rounding errors above machine precision
             v -= basis[:, : j + 1] @ (basis[:, : j + 1].T @ v)
         off[j] = np.linalg.norm(v)
         basis[:, j + 1] = v / off[j]
@@ -254,7 +257,7 @@ def _dampers(chain: SpringMassChain, poles: ArrayLike | None, zeros: ArrayLike |
         ratio = np.atleast_1d(np.asarray(value, dtype=np.float64))
         if ratio.shape != (n,) or not np.isfinite(ratio).all():
             raise InputError(f"{name}: expected {n} finite damping ratios, got {value}")
-        # Rows as damping ratios: a slow mode counts as much as a fast one.
+        # As damping ratios, slow and fast modes have equal weight.
         rows.append(chain._natural(held)[1] / (2 * frequency)[:, None])
         targets.append(ratio)
     return np.asarray(scipy.optimize.nnls(np.vstack(rows), np.concatenate(targets))[0])

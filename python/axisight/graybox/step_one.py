@@ -39,18 +39,17 @@ class RigidBodyFriction:
     offset_nm
         Constant torque; None where it was not estimated.
     covariance
-        Of inertia, viscous and Coulomb friction (and offset), in that order.
+        Covariance of inertia, viscous and Coulomb friction (and offset), in that order.
     residual_rms_nm, fit_percent
-        What the regression leaves of the filtered torque, and fit (3.54) of it.
+        Rms residual of the filtered torque, and fit (3.54) of the regression to it.
     cutoff_hz
-        Zero-phase low-pass filter: half-power frequency of one pass is higher, the double pass
-        has half of the amplitude here.
+        Frequency at which the zero-phase low-pass filter (both passes) halves the amplitude.
     condition
         Condition number of the regressor, columns scaled to one.
     n_used
-        Samples that took part.
+        Number of samples used.
     findings
-        What to know before using the values.
+        Warnings to read before using the values.
     """
 
     inertia_kg_m2: float
@@ -78,28 +77,29 @@ def rigid_body_friction(
     least_speed_rad_s: float = 0.0,
     offset: bool = False,
 ) -> RigidBodyFriction:
-    """Estimate J_m + r^2 J_a, F_v and F_c of one axis by the regression (9.11).
+    """Return J_m + r^2 J_a, F_v and F_c of one axis by the regression (9.11).
 
-    Position and torque pass the same zero-phase low-pass filter (Butterworth of order 4,
-    forward and backward), velocity and acceleration are central differences of the filtered
-    position, and the sign of that velocity passes the filter too: all columns and the torque
-    are then seen through one filter, which costs no bias where the model holds. Two and a half periods
-    of the cutoff at either end are left out.
+    Position and torque pass the same zero-phase low-pass filter (Butterworth of order 4, forward and
+    backward). Velocity and acceleration are central differences of the filtered position, and the
+    sign of that velocity passes the filter too. Thus all columns and the torque pass one filter,
+    which causes no bias if the model holds. The regression leaves out two and a half periods of the
+    cutoff at either end.
 
-    Standard errors take the residuals as they are, correlated over time (Newey and West 1987,
-    Econometrica 55): what the rigid model lacks lasts for many samples.
+    Standard errors allow for residuals that are correlated over time (Newey and West 1987,
+    Econometrica 55), because errors of the rigid model last for many samples.
 
     Parameters
     ----------
     torque_nm, position_rad : motor side, (n,).
-    sample_time_s : [s].
+    sample_time_s : sample time [s].
     cutoff_hz : well below the first resonance, well above the motion's own frequency.
-    least_speed_rad_s : slower samples are left out, where friction is no sign function.
+    least_speed_rad_s : the regression leaves out slower samples, at which friction is not a sign
+        function.
     offset : whether to estimate a constant torque too.
 
-    Raises InputError for wrong or short arrays, a cutoff out of range, motion in one
-    direction only (Coulomb friction is then a constant like any other), a
-    speed that does not change (viscous and Coulomb friction are then one) and no acceleration.
+    Raises InputError for wrong or short arrays, a cutoff out of range, motion in one direction only
+    (Coulomb friction then equals a constant torque), constant speed (viscous and Coulomb friction
+    are then one) and no acceleration.
 
     """
     torque, position = series_pair("torque_nm", torque_nm, "position_rad", position_rad)
@@ -172,7 +172,7 @@ def _regress(
     q, upper = np.linalg.qr(scaled)
     solution = np.linalg.solve(upper, q.T @ torque)
     left = torque - scaled @ solution
-    # Residuals are filtered: correlated over at least the inverse of the cutoff.
+    # The filter correlates residuals over at least the inverse of the cutoff.
     lags = min(round(_LAG_PERIODS / cutoff_hz / sample_time_s), len(torque) // 8)
     inverse = np.linalg.inv(upper)
     covariance = _long_run(q * left[:, None], lags, inverse) / np.outer(size, size)
@@ -205,11 +205,11 @@ def _regress(
 
 
 def _long_run(scores: Real, lags: int, inverse: Real) -> Real:
-    """Covariance of the solution from scores that are correlated up to some lag."""
+    """Return the covariance of the solution, from scores that are correlated up to ``lags``."""
     triangle = 1 - np.abs(np.arange(-lags, lags + 1)) / (lags + 1)
     total = scores.T @ scipy.signal.fftconvolve(scores, triangle[:, None], mode="same", axes=0)
-    # The window averages a spectrum of so many degrees of freedom near zero frequency, where
-    # the estimate has taken a sine and a cosine of each column out of the residuals.
+    # Degrees of freedom of the averaged spectrum near zero frequency. There the estimate has removed
+    # a sine and a cosine of each column from the residuals.
     freedom = 1.5 * len(scores) / lags
     scale = freedom / max(freedom - 2 * scores.shape[1], 1.0)
     return np.asarray(scale * inverse @ total @ inverse.T)

@@ -1,4 +1,4 @@
-"""Is a fitted model good enough: fit, residual tests, cross-validation.
+"""Validation of a fitted model: fit, residual tests, cross-validation.
 
 Wernholt (2004), section 3.5; Ljung (1999), System Identification, chapter 16.
 """
@@ -37,9 +37,9 @@ def fit_percent(measured: ArrayLike, simulated: ArrayLike) -> float:
     """Return the model fit (3.54) in per cent.
 
     ``100 (1 - |y - yhat| / |y - mean(y)|)``, y the ``measured`` output and yhat the ``simulated``
-    or predicted one, (n,): 100 for a perfect model, 0 for one no better than the mean, negative
-    for worse. Raises InputError for other shapes, values that are not finite, and a measurement
-    that does not vary.
+    or predicted one, (n,). It is 100 for a perfect model, 0 for one no better than the mean, and
+    negative for a worse one. Raises InputError for other shapes, values that are not finite, and a
+    constant measurement.
     """
     y, model = series_pair("measured", measured, "simulated", simulated)
     if np.ptp(y) == 0:
@@ -50,7 +50,7 @@ def fit_percent(measured: ArrayLike, simulated: ArrayLike) -> float:
 @summarized
 @dataclass(frozen=True, eq=False)
 class ResidualTests:
-    """What the residuals say about a model.
+    """Results of residual tests of a model.
 
     correlations
         Dataset over ``lag`` (samples; positive: input before residual) with
@@ -59,9 +59,10 @@ class ResidualTests:
     whiteness_p_value
         Probability of autocorrelations at least as large if the residuals are white.
     independence_p_value
-        The same of cross-correlation with past inputs, if the residuals do not depend on the input.
+        Probability of cross-correlations with past inputs at least as large, if the residuals do not
+        depend on the input.
     feedback_p_value
-        The same of cross-correlation with later inputs.
+        The same probability for cross-correlations with later inputs.
     closed_loop
         Whether the data are from a closed loop.
     """
@@ -74,10 +75,10 @@ class ResidualTests:
 
     @property
     def verdict(self) -> str:
-        """In words."""
+        """The verdict of the tests in words."""
         level = 1 - float(self.correlations.attrs["probability"])
         parts = []
-        # White residuals cannot reach later ones through the controller, others can.
+        # Only residuals that are not white can depend on earlier ones through the controller.
         feeds = self.closed_loop and max(self.feedback_p_value, self.whiteness_p_value) < level
         if self.independence_p_value < level:
             parts.append(
@@ -109,33 +110,34 @@ def residual_tests(
     probability: float = 0.99,
     closed_loop: bool = True,
 ) -> ResidualTests:
-    """Test residuals for whiteness and for independence of the input.
+    """Return tests of residuals for whiteness and for independence of the input.
 
     Ljung (1999), section 16.6. Whiteness: n times the sum of squared autocorrelations over
-    lags 1 to ``lags`` is chi-squared with as many degrees of freedom (16.34). Independence: the
-    cross-covariances over the lags are normal with covariance
+    lags 1 to ``lags`` is chi-squared with as many degrees of freedom (16.34). Independence: if the
+    residuals, white or not, do not depend on the input (16.40), the cross-covariances at lags i and j
+    are normal with covariance
 
         sum_k R_e(k) R_u(k + i - j) / n
 
-    for lags i and j if the residuals, white or not, do not depend on the input (16.40); the
-    quadratic form in its inverse is chi-squared. Directions in which the input has less than a
-    thousandth of its power, where it says nothing, are left out. R_e and R_u are estimated with
+    and the quadratic form with the inverse covariance is chi-squared. Directions with less than a
+    thousandth of the power of the input tell nothing and are left out. R_e and R_u are estimated with
     Parzen's window over a tenth of the record.
 
-    Negative lags are inputs that come after the residual. In closed loop the controller puts
-    residuals into later inputs, with an undelayed controller also into that of the same sample:
-    these lags say nothing against the model, which is judged by lags from one on (open
-    loop: from zero on). Residuals that are not white, as those of an output-error model with
-    noise before the output, are then correlated with past inputs too, through their own past;
-    give the reference as ``input_`` to be sure: nothing feeds back into it.
+    Negative lags are inputs that come after the residual. In closed loop the controller feeds
+    residuals into later inputs, and without delay also into the input of the same sample. Therefore
+    the test of independence uses lags from one on (open loop: from zero on). Residuals that are not
+    white, for example those of an output-error model with noise before the output, then also
+    correlate with past inputs, through their own past. To avoid this, give the reference as
+    ``input_``, which has no feedback.
 
     Parameters
     ----------
     residual, input_ : (n,); the input of the model, or the reference of the loop.
-    lags : how many lags on either side.
-    lag_step : samples from lag to lag of the correlations, more than one where the samples are
-        dense; whiteness is judged from sample to sample.
-    probability : of the limits.
+    lags : number of lags on either side.
+    lag_step : samples between lags of the correlations, more than one for dense samples; the test of
+        whiteness uses every sample.
+    probability : probability that a correlation stays within its limits.
+    closed_loop : whether the data are from a closed loop.
 
     Raises InputError for arrays that do not fit, too few samples, and lags out of range.
 
@@ -182,8 +184,8 @@ def residual_tests(
 
 
 def _smoothed_spread(auto: Real, power: Real, count: int) -> Real:
-    """`covariance_spread` with Parzen's window, as wide as they are, on both autocovariances."""
-    # On both: their spectra are then never negative, and power stays in its band.
+    """Return `covariance_spread` with Parzen's window, of full width, on both autocovariances."""
+    # The window on both keeps their spectra non-negative, and power in its band.
     window = _parzen(np.arange(len(auto)), len(auto) - 1)
     return covariance_spread(auto * window, np.pad(power * window, (0, count - 1)), count)
 
@@ -201,18 +203,19 @@ def cross_validation(
     *,
     combinations: Sequence[Sequence[str]] | None = None,
 ) -> tuple[xr.DataArray, dict[str, M]]:
-    """Fit on some data sets, validate on all: Table 9.2 for any model.
+    """Return the fit to all data sets of models fitted to some of them, as in Table 9.2.
 
     Parameters
     ----------
-    fit : from a list of data sets to a model.
-    data_sets : by name.
-    simulate, measured : output of a model for a data set, and the measured one, (n,).
+    fit : function from a list of data sets to a model.
+    data_sets : data sets by name.
+    simulate, measured : functions that return the output (n,) of a model for a data set, and its
+        measured output (n,).
     combinations : names of the data sets of each fit; default each alone, and all.
 
     Returns fits (3.54) in per cent, dims (data_set, estimated_on), with an attribute
-    ``own`` that says which were fitted, and the models by the same names. Raises InputError for
-    unknown names and empty combinations.
+    ``own`` that says which data sets were fitted, and the models by the same names. Raises InputError
+    for unknown names, empty combinations and without data sets.
 
     """
     if not data_sets:
@@ -241,7 +244,7 @@ def fit_table(
 ) -> xr.DataArray:
     """Return the fit (3.54) of every model on every data set, dims (data_set, estimated_on) [%].
 
-    ``models`` and ``data_sets`` by name; ``simulate`` and ``measured`` as for
+    ``models`` and ``data_sets`` are dicts by name; ``simulate`` and ``measured`` are those of
     :func:`cross_validation`.
     """
     rows = [

@@ -1,12 +1,12 @@
-"""What an experiment tells of parameters, before anything is fitted.
+"""Information of an experiment on parameters, before any fit.
 
-The Fisher information of a planned experiment is M = J^T W J, with J the Jacobian of what will be
-measured and W the inverse covariance of its noise. A parameter is judged on the scale on which a
-change of it matters, as a rule its nominal value. Directions in which M has nothing to say are
-put in words: which combination is seen, and which parameters are not, each for itself.
+The Fisher information of a planned experiment is M = J^T W J, with J the Jacobian of the measurements
+and W the inverse covariance of their noise. Each parameter has a scale on which a change matters,
+usually its nominal value. For directions without information, sentences name the combination that
+the data determine and the parameters that they do not determine alone.
 
-Everything works on arrays; `of_regressor`, `of_fit` and `of_simulation` make them from what
-other parts of Axisight give, `of_matrix` from any information matrix.
+All functions work on arrays. `of_regressor`, `of_fit` and `of_simulation` make them from other results
+of Axisight, and `of_matrix` from any information matrix.
 """
 
 from axisight.identifiability.assessment import Combination, Identifiability, identifiability

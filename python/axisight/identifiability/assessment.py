@@ -1,4 +1,4 @@
-"""What an information says of its parameters, in numbers and in words."""
+"""Assessment of an information: standard deviations, and combinations that are not determined."""
 
 from __future__ import annotations
 
@@ -20,24 +20,25 @@ from axisight.statistics.least_squares import unit_columns
 Form = Literal["auto", "power", "linear"]
 
 NUMERICAL_RANK = 1e-11
-"""Singular values of the weighted Jacobian, columns at unit length, below this share of the largest
-are rounding of the derivatives."""
+"""Singular values of the weighted Jacobian below this share of the largest are rounding of the
+derivatives, for columns of unit length."""
 POOR = 0.5
-"""A combination not known to half its scale is poorly identifiable."""
+"""Relative standard deviation above which a combination is poorly identifiable."""
 TILT = 0.05
-"""Shares below this, relative to the scales, are left out of what is poorly known."""
+"""Smallest share of a parameter, relative to its scale, in a poorly identifiable combination."""
 SIMPLE_POWERS = (0.5, 1.0, 2.0, 3.0)
 
 
 @summarized
 @dataclass(frozen=True)
 class Combination:
-    """Parameters that are entangled, and what of them is seen.
+    """Parameters that the data do not determine alone, and combinations that they do.
 
-    ``kind``: ``unidentifiable`` (the data say nothing), or ``poor`` (not to the limit asked for).
-    ``parameters`` that are not known each; ``seen`` the combinations that are, in words, with
-    relative standard deviations ``seen_std``. ``relative_std`` of the worst direction, infinite
-    if unidentifiable. ``directions`` (n_lost, n) are changes that hardly show, in units of the scales.
+    ``kind`` is ``unidentifiable`` (no information) or ``poor`` (standard deviation above the limit).
+    ``parameters`` are those not known alone. ``seen`` are the combinations that are known, as text,
+    with relative standard deviations ``seen_std``. ``relative_std`` is that of the worst direction,
+    infinite if unidentifiable. ``directions`` (n_lost, n) are changes that hardly show, in units of
+    the scales.
     """
 
     kind: Literal["unidentifiable", "poor"]
@@ -48,7 +49,7 @@ class Combination:
     directions: Array = field(repr=False)
 
     def __str__(self) -> str:
-        """In words."""
+        """Return the combination as a sentence."""
         known = " and ".join(
             f"{text} (to {percent(std)})"
             for text, std in zip(self.seen, self.seen_std, strict=True)
@@ -69,12 +70,13 @@ class Combination:
 @summarized
 @dataclass(frozen=True)
 class Identifiability:
-    """What an experiment tells.
+    """Identifiability of parameters from an experiment.
 
-    ``rank`` of the information, of ``len(names)``; ``condition`` of its root, parameters scaled;
-    infinite without full rank. ``relative_std`` (n,) are Cramer and Rao's least standard
-    deviations by scale, infinite for what is not seen; ``correlation`` (n, n), NaN there.
-    ``combinations`` are what is not known, ``clusters`` groups of parameters correlated beyond the limit.
+    ``rank`` is that of the information, at most ``len(names)``. ``condition`` is that of its root for
+    scaled parameters, infinite without full rank. ``relative_std`` (n,) are the least standard
+    deviations of Cramer and Rao relative to the scales, infinite for parameters without information;
+    ``correlation`` (n, n) is NaN for these. ``combinations`` are those that are not known to ``limit``.
+    ``clusters`` are groups of parameters correlated beyond the correlation limit.
     """
 
     names: tuple[str, ...]
@@ -90,7 +92,7 @@ class Identifiability:
 
     @property
     def identifiable(self) -> bool:
-        """Whether every parameter is known to the limit."""
+        """Whether every parameter is known to ``limit``."""
         return not self.combinations
 
     @property
@@ -123,18 +125,18 @@ def identifiability(
     form: Form = "auto",
     correlation_limit: float = 0.95,
 ) -> Identifiability:
-    """Return what an experiment tells, and in words what it does not.
+    """Return which parameters an experiment determines, and combinations that it does not determine.
 
     experiment
-        Its information, several experiments added up.
+        Information of the experiment, or the sum over several experiments.
     limit
-        Relative standard deviation from which on a combination is poorly identifiable.
+        Relative standard deviation above which a combination is poorly identifiable.
     form
-        How combinations are written: ``"power"``, products and ratios; ``"linear"``, sums, for
-        models linear in the parameters; ``"auto"``, powers where they are simple. To first
-        order both say the same.
+        Form of combinations: ``"power"`` for products and ratios; ``"linear"`` for sums, for models
+        linear in the parameters; ``"auto"`` for powers if they are simple. Both forms agree to first
+        order.
     correlation_limit
-        Parameters correlated beyond this are in one cluster.
+        Parameters with correlations beyond this form one cluster.
 
     Raises InputError for misuse.
     """
@@ -182,7 +184,7 @@ def decomposed(experiment: Information) -> tuple[Array, Array, int]:
     rank = int(np.sum(values > NUMERICAL_RANK * values[0])) if values.size and values[0] > 0 else 0
     scaled = root * experiment.scales
     padded = np.vstack([scaled, np.zeros((max(n - len(scaled), 0), n))])
-    # The exact null space comes from the unit columns: scales must not decide what is rounding.
+    # The exact null space comes from unit columns, so that scales do not decide what is rounding.
     _, _, unit_vt = np.linalg.svd(np.vstack([unit, np.zeros((max(n - len(unit), 0), n))]))
     null = unit_vt[rank:].T / np.where(root.any(axis=0), size * experiment.scales, 1.0)[:, None]
     q, _ = np.linalg.qr(null, mode="complete") if rank < n else (np.eye(n), None)
@@ -198,18 +200,18 @@ def decomposed(experiment: Information) -> tuple[Array, Array, int]:
 def _combinations(
     experiment: Information, v: Array, spread: Array, limit: float, form: Form
 ) -> list[Combination]:
-    """Return the entangled groups of what is not known, parameters expressed by chosen ones."""
+    """Return the groups of parameters that are not known alone, with the combinations that are."""
     chosen, lost = spread > limit, np.isinf(spread)
     if not chosen.any():
         return []
     names, space = experiment.names, v[:, chosen]
     n, k = space.shape
-    # Among equals the later parameter is expressed by the earlier ones.
+    # Of parameters with equal shares, the later one is expressed by the earlier ones.
     later = 1 + 0.1 * np.arange(n) / n
     _, _, pivots = linalg.qr(space.T * later, mode="economic", pivoting=True)
     free = np.sort(pivots[:k])
     shares = space @ np.linalg.inv(space[free])
-    # An exact null space is sharp; what is merely poor tilts a little.
+    # An exact null space has no small shares except rounding, but poor directions tilt a little.
     shares[np.abs(shares) < (1e-6 if lost[chosen].all() else TILT)] = 0.0
     linked = np.zeros((n, n))
     linked[:, free] = np.abs(shares)
@@ -230,7 +232,7 @@ def _combinations(
             contrast[free[own]] = -powers
             stds.append(float(np.linalg.norm(v[:, ~chosen].T @ contrast * spread[~chosen])))
         unseen = np.linalg.norm(v[np.ix_(members, lost)], axis=0) > 0.5
-        # The longest axis of what is lost of these parameters.
+        # The worst direction of these parameters.
         poor = chosen & ~lost
         worst = float(np.linalg.norm(v[np.ix_(members, poor)] * spread[poor], ord=2))
         out.append(
@@ -249,7 +251,7 @@ def _combinations(
 def _expression(
     names: Sequence[str], scales: Array, i: int, others: NDArray[np.intp], powers: Array, form: Form
 ) -> str:
-    """Write what stays when the others move: theta_i less their shares, or over their powers."""
+    """Return the combination that stays constant: theta_i minus shares of others, or over their powers."""
     simple = all(min(abs(abs(p) - x) for x in SIMPLE_POWERS) < 0.02 for p in powers)
     if form == "power" or (form == "auto" and simple):
         top: list[str] = [names[i]]
@@ -274,7 +276,7 @@ def _power(power: float) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share in words."""
+    """Return a share as text in per cent."""
     if not np.isfinite(share):
         return "nothing"
     return f"{100 * share:.2g} %" if share < 10 else "worse than 1000 %"

@@ -1,4 +1,4 @@
-"""Which further experiment separates what the present ones do not."""
+"""Comparison of further experiments by the parameters that they would separate."""
 
 from __future__ import annotations
 
@@ -22,20 +22,25 @@ from axisight.identifiability.information import Information
 def compare_experiments(
     base: Information, candidates: Sequence[Information], *, limit: float = POOR
 ) -> xr.Dataset:
-    """Return what each candidate would add to the experiments there are.
+    """Return the gain of each candidate when it is added to the present experiments.
 
     base
-        Information of what is planned or done.
+        Information of planned or finished experiments.
     candidates
-        Information of experiments that could be added, each with a ``name``.
+        Information of possible further experiments, each with a ``name``.
     limit
         As in `identifiability`.
 
-    Variables over ``candidate``, in the order given: ``rank``, ``condition``, ``worst_std`` (largest
-    relative standard deviation with the candidate), ``log_det_gain`` (of the information; infinite
-    where it gains rank), ``separates`` (names of parameters that become known to the limit, separated by
-    commas), ``words``. ``attrs["best"]`` is the name of the one that leaves least
-    unknown, empty where none helps. Raises InputError for no candidates or other parameters.
+    Variables over ``candidate``, in the given order:
+
+    - ``rank``, ``condition``: those with the candidate
+    - ``worst_std``: largest relative standard deviation with the candidate
+    - ``log_det_gain``: gain of log det of the information, infinite for a gain in rank
+    - ``separates``: names of parameters that become known to the limit, separated by commas
+    - ``words``: a sentence on the candidate
+
+    ``attrs["best"]`` is the name of the candidate that leaves the fewest directions unknown, empty if
+    none helps. Raises InputError without candidates and for other parameters.
     """
     if not candidates:
         raise InputError("candidates: expected at least one experiment, got none")
@@ -54,7 +59,7 @@ def compare_experiments(
         rows.append(
             (label, after, gained, gain, _sentence(candidate, label, after, gained, before))
         )
-    # Least unknown; then the least worst parameter; then most information.
+    # Fewest unknown directions first, then the smallest worst deviation, then most information.
     order = [
         (_unknown(a), -int(np.sum(a.relative_std <= limit)), float(np.max(a.relative_std)), -gain)
         for _, a, _, gain, _ in rows
@@ -76,7 +81,7 @@ def compare_experiments(
 
 
 def _unknown(found: Identifiability) -> int:
-    """Return how many directions are not known to the limit."""
+    """Return the number of directions that are not known to the limit."""
     return sum(len(c.directions) for c in found.combinations)
 
 
@@ -102,10 +107,12 @@ def _sentence(
 def recommend_experiments(
     base: Information, candidates: Sequence[Information], *, limit: float = POOR, most: int = 5
 ) -> tuple[str, ...]:
-    """Return in words which candidates to add, one after the other, until all is known.
+    """Return one sentence per candidate to add, one after the other, until all parameters are known.
 
-    ``base``, ``candidates`` and ``limit`` as in `compare_experiments`; at most ``most`` are
-    added, each the best after those before. Empty where nothing is unknown or none helps.
+    ``base``, ``candidates`` and ``limit`` are those of `compare_experiments`. At most ``most``
+    candidates are added, each the best after the earlier ones. The result is empty if all parameters
+    are known or no candidate helps. Raises InputError for names that are not unique, and for ``most``
+    below 1.
     """
     if most < 1:
         raise InputError(f"most: expected a whole number from 1 on, got {most}")

@@ -20,9 +20,10 @@ Array = NDArray[np.float64]
 class Information:
     """The Fisher information of an experiment, as a root: M = ``root``^T ``root``.
 
-    ``names`` (n,) of the parameters, ``scales`` (n,) on which a change matters, in their units;
-    ``root`` (k, n). ``name`` of the experiment, ``advice`` what to do to have it ("add the pose
-    ..."). Information of independent experiments adds: ``a + b``.
+    ``names`` (n,) are those of the parameters, and ``scales`` (n,) the sizes of changes that matter, in
+    the units of the parameters. ``root`` is (k, n). ``name`` is that of the experiment, and ``advice``
+    says how to carry it out ("add the pose ..."). Information of independent experiments adds:
+    ``a + b``.
     """
 
     names: tuple[str, ...]
@@ -33,11 +34,11 @@ class Information:
 
     @property
     def matrix(self) -> Array:
-        """M, (n, n), per unit of the parameters squared."""
+        """M, (n, n), per squared units of the parameters."""
         return np.asarray(self.root.T @ self.root)
 
     def __add__(self, other: Information) -> Information:
-        """Join two experiments with the same parameters and scales; raises InputError if not."""
+        """Return the information of both experiments; raises InputError for other parameters or scales."""
         if not isinstance(other, Information) or other.names != self.names:
             raise InputError(f"other: expected the parameters {', '.join(self.names)}")
         if not np.allclose(other.scales, self.scales, rtol=1e-6, atol=0):
@@ -57,24 +58,24 @@ def information(
     name: str = "",
     advice: str = "",
 ) -> Information:
-    """Return the information of an experiment from the Jacobian of what it measures.
+    """Return the information of an experiment from the Jacobian of its measurements.
 
     jacobian
         d measurement / d parameter, (n_measurements, n_parameters), or a sequence of such blocks.
-        A complex one, of a frequency response, counts real and imaginary parts, each with half
-        the variance.
+        For a complex Jacobian of a frequency response, real and imaginary parts count as
+        measurements, each with half the variance.
     names, scales
-        Of the parameters; scales positive, in their units.
+        Names of the parameters, and their scales, positive, in their units.
     noise_std
-        Standard deviation of each measurement, a number or (n_measurements,); sqrt(E|e|^2) of
-        complex ones. By default one: the Jacobian is of whitened residuals.
+        Standard deviation of each measurement, a number or (n_measurements,); sqrt(E|e|^2) for
+        complex measurements. Default one, for the Jacobian of whitened residuals.
     noise_covariance
-        Instead of ``noise_std``, (n_measurements, n_measurements) of correlated real
-        measurements.
+        Covariance (n_measurements, n_measurements) of correlated real measurements, instead of
+        ``noise_std``.
     name, advice
-        Of the experiment, for `compare_experiments`.
+        Name of the experiment, and advice on it, for `compare_experiments`.
 
-    Raises InputError for shapes that do not fit, numbers that are not finite, a covariance that
+    Raises InputError for shapes that do not fit, numbers that are not finite, and a covariance that
     is not positive definite.
     """
     labels = _labels(names)
@@ -117,9 +118,10 @@ def of_matrix(
 ) -> Information:
     """Return the information of an experiment from its ``matrix`` M, (n, n).
 
-    ``names``, ``scales``, ``name`` and ``advice`` as in `information`. M is the square of the
-    Jacobian and has half its digits: combinations known 1e7 times worse than others cannot be
-    told from unidentifiable ones. Raises InputError if M is not symmetric and semi-definite.
+    ``names``, ``scales``, ``name`` and ``advice`` are those of `information`. M is the square of the
+    Jacobian and has half its digits. It therefore does not tell combinations known 1e7 times worse
+    than others from unidentifiable ones. Raises InputError if M is not symmetric and positive
+    semi-definite.
     """
     labels = _labels(names)
     sizes = _scales(scales, len(labels))
@@ -131,7 +133,7 @@ def of_matrix(
     values, vectors = np.linalg.eigh((unit + unit.T) / 2)
     if np.abs(unit - unit.T).max() > 1e-8 or values[0] < -1e-8 * max(values[-1], 1e-300):
         raise InputError("matrix: expected a symmetric positive semi-definite matrix")
-    # Rounding of M is of the size of its precision: below that there is no information.
+    # Smaller eigenvalues are rounding errors of M, not information.
     kept = values > 1e-13 * values[-1]
     root = (np.sqrt(values[kept])[:, None] * vectors[:, kept].T) * size
     return Information(labels, sizes, root, name, advice)

@@ -1,4 +1,4 @@
-"""Information from what other parts of Axisight give."""
+"""Information from results of other parts of Axisight."""
 
 from __future__ import annotations
 
@@ -36,16 +36,17 @@ def of_regressor(
     """Return the information of a motion for a model linear in its parameters.
 
     regressor
-        DataArray with the dimension ``parameter`` last, as
-        ``axisight.rigid_body.torque_regressor`` gives it; all others are measurements.
+        DataArray of ``axisight.rigid_body.torque_regressor``, with the dimension ``parameter`` last; all
+        other dimensions are measurements.
     torque_std_nm
         Standard deviation of the torque, a number or one for each joint or axis [Nm].
     scales
-        By default the nominal values; where those are zero, the largest of the same unit.
+        Scales of the parameters, in their units. By default the nominal values, or for a zero value the
+        largest of the same unit.
     name, advice
-        Of the experiment.
+        Name of the experiment and advice, as in `information`.
 
-    Raises InputError for another DataArray.
+    Raises InputError for another DataArray, and for standard deviations of another shape.
     """
     if not isinstance(regressor, xr.DataArray) or regressor.dims[-1:] != ("parameter",):
         raise InputError("regressor: expected a DataArray with the last dimension 'parameter'")
@@ -73,7 +74,7 @@ def of_regressor(
 
 
 def _typical(nominal: Array, unit: xr.DataArray | None) -> Array:
-    """Return nominal sizes; where they are zero the largest of the same unit, else one."""
+    """Return nominal sizes; for a zero value the largest of the same unit, or one without it."""
     out = nominal.astype(np.float64)
     labels = np.zeros(len(out), dtype="U1") if unit is None else unit.values
     for k in np.flatnonzero(out == 0):
@@ -85,10 +86,10 @@ def _typical(nominal: Array, unit: xr.DataArray | None) -> Array:
 def of_fit(
     fitted: Fitted, *, scales: ArrayLike | None = None, name: str = "", advice: str = ""
 ) -> Information:
-    """Return the information of the data of a finished `axisight.fit`, priors left out.
+    """Return the information of the data of a finished `axisight.fit`, without priors.
 
-    ``fitted`` has whitened residuals, so that the noise counts one; ``scales`` are by default the
-    fitted values. ``name`` and ``advice`` are of the experiment.
+    The residuals of ``fitted`` are whitened, so the noise has standard deviation one. ``scales`` are
+    by default the fitted values. ``name`` and ``advice`` are those of `information`.
     """
     size = np.abs(fitted.values)
     return information(
@@ -110,10 +111,10 @@ def of_simulation(
     name: str = "",
     advice: str = "",
 ) -> Information:
-    """Return what a planned closed-loop experiment would tell of robot and effect parameters.
+    """Return the information of a planned closed-loop experiment on robot and effect parameters.
 
     robot, effects
-        The machine as it is believed to be; it is simulated.
+        The assumed machine, which is simulated.
     velocity_ref_rad_s
         Planned references, (n, n_axes), motor side.
 
@@ -121,9 +122,10 @@ def of_simulation(
     ----------
         As for `axisight.fit`, at their initial values; frozen ones are left out.
     torque_std_nm
-        Standard deviation of the commanded torque that no model explains, a number or one per axis.
+        Standard deviation of the commanded torque that no model explains [Nm], a number or one per
+        axis.
     name, advice
-        Of the experiment.
+        Name of the experiment and advice, as in `information`.
 
     Derivatives are exact. Raises InputError for misuse and a simulation that fails.
 
@@ -167,10 +169,10 @@ def of_log_information(
 ) -> Information:
     """Return the information of an experiment whose ``matrix`` is per logarithm of the parameters.
 
-    As ``axisight.frequency_fit`` has it (``FrequencyFit.information``). ``values`` by name, in the
-    order of the matrix, are the scales: a standard deviation is relative to them. For one that
-    is not searched by its logarithm, a centre of mass, give one. ``name`` and ``advice`` as in
-    `information`. Raises InputError for values that are not positive, and as `of_matrix`.
+    ``FrequencyFit.information`` is such a matrix. ``values`` by name, in the order of the matrix, are
+    the scales: standard deviations are relative to them. Give the value one for a centre of mass,
+    which is not searched by its logarithm. ``name`` and ``advice`` are those of `information`. Raises
+    InputError for values that are not positive, and as `of_matrix`.
     """
     sizes = np.array(list(values.values()), np.float64)
     if not (np.isfinite(sizes) & (sizes > 0)).all():
@@ -190,8 +192,9 @@ def of_covariance(
 ) -> Information:
     """Return the information of a finished fit from its ``covariance`` (n, n), positive definite.
 
-    ``values`` by name in its order, for instance of ``axisight.graybox.AxisFit``: its ``free``
-    and ``values``; they are the scales, zero ones count one. ``name`` and ``advice`` as in `information`.
+    ``values`` by name, in the order of the covariance, are the scales; the scale of a zero value is
+    one. For ``axisight.graybox.AxisFit`` they are its ``values`` by ``free``. ``name`` and ``advice``
+    are those of `information`.
     """
     size = np.abs(np.array(list(values.values()), np.float64))
     return information(

@@ -1,4 +1,4 @@
-"""How much memory the reading of a log may take: what a file declares is held against it beforehand."""
+"""The memory limit for reading a log, checked against the declared sizes before reading."""
 
 from __future__ import annotations
 
@@ -10,17 +10,19 @@ from axisight.arguments import whole
 from axisight.errors import LogError
 
 BASE_BYTES = 64 * 2**20
-"""What any log may take."""
+"""Bytes that every log may take."""
 BYTES_PER_BYTE = 16
-"""What it may take besides for each byte of its files: more than measured data are packed by."""
+"""Further bytes that a log may take per byte of its files; measured data compress by a smaller factor."""
 
 _MOST = 2**62
 
 
 class Budget:
-    """What one log may take in bytes, as read and again as signals: by the size of its files, or as said.
+    """The bytes that one log may take: `max_bytes`, or by default a limit from the size of its files.
 
-    Reading takes at most twice the limit, besides what is loaded anyway.
+    Arrays count when they are read, and signals count again when they are made from them. Reading takes at
+    most twice the limit on top of the memory in use before. Raises InputError for a `max_bytes` that is not a
+    whole number from 1.
     """
 
     def __init__(self, max_bytes: int | None = None) -> None:
@@ -30,15 +32,15 @@ class Budget:
 
     @property
     def limit(self) -> int:
-        """The most bytes that may be taken."""
+        """The largest number of bytes that may be taken."""
         return self._grown if self._given is None else self._given
 
     def grow(self, files: Iterable[Path]) -> None:
-        """Allow for the sizes of files that belong to the log."""
+        """Raise the limit by the sizes of files that belong to the log."""
         self._grown += BYTES_PER_BYTE * sum(file.stat().st_size for file in files if file.is_file())
 
     def take(self, declared_bytes: int) -> None:
-        """Count bytes about to be taken; raises LogError where all of them are more than the limit."""
+        """Count bytes before they are taken; raise LogError if the total exceeds the limit."""
         taken = self._taken + declared_bytes
         if taken > self.limit:
             raise LogError(
@@ -49,7 +51,7 @@ class Budget:
         self._taken = taken
 
     def take_values(self, shape: Iterable[int], item_bytes: int) -> None:
-        """Count an array of a shape and bytes per item."""
+        """Count an array by its shape and its bytes per item; raise LogError as `take`."""
         self.take(prod(map(int, shape)) * int(item_bytes))
 
 

@@ -99,7 +99,9 @@ def read_case(
     load: Callable[..., Robot] = load_robot,
     currents: bool = False,
 ) -> Case:
-    """Read `case.toml` in `folder` and every log it lists; `columns` is for non-native logs.
+    """Return the case in `folder`, with every log that its `case.toml` lists.
+
+    `columns` is the column map for logs without native columns.
 
     `columns`, `max_bytes` and `currents` are as in `read_log`; `max_bytes` holds for each log separately.
     ``untrusted``: refuse everything that leads out of the folder, for cases from strangers. These are
@@ -107,10 +109,10 @@ def read_case(
     ``load``: function that returns the robot for the path in the case. Its gear ratios convert joint-side
     signals, its torque constants convert currents.
 
-    Raises CaseError naming file and field: case.toml missing or invalid, unknown keys, no estimation log,
-    robot file missing, one file listed twice, logs with different numbers of axes, a period that is not a
-    whole number of samples or is longer than the log. Raises LogError for a log that cannot be read or has
-    another sample rate.
+    Raises CaseError, naming file and field, for a missing or invalid case.toml, unknown keys, a missing robot
+    file, a case without estimation logs, and a file listed twice. Raises CaseError for logs with different
+    numbers of axes, and for a period that is not a whole number of samples or exceeds the log. Raises
+    LogError for a log that cannot be read or has another sample rate.
     """
     folder = usable_path(folder, CaseError)
     path = folder / "case.toml"

@@ -1,4 +1,4 @@
-"""Messages of ROS 2 by the definition that stands beside them, in files that are not of ROS."""
+"""Decode ROS 2 messages (CDR) in files not recorded by ROS, from the type definitions in the file."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from axisight.arguments import short
 from axisight.errors import LogError, MissingExtraError
 
 SCHEMAS = ("ros2msg", "ros2idl")
-"""Encodings of definitions of ROS 2."""
-# Before each of several definitions in IDL.
+"""Schema encodings of ROS 2 type definitions."""
+# These lines begin each definition if an IDL text has several.
 _SEPARATOR = "=" * 80 + "\n"
 _HEAD = "IDL: "
 
 
 def decoder_of_ros2(schema: Any, topic: str) -> Callable[[bytes], Any] | str:
-    """Return what decodes messages in CDR by the schema of their channel, or why nothing does.
+    """Return a decoder for the CDR messages of a channel, or the reason why there is none.
 
-    One without a text is of a type that the library knows. Raises LogError for a text that cannot be used,
-    MissingExtraError without the library.
+    A schema without text must name a standard type of ROS 2 Humble. Raises LogError for a definition that
+    cannot be used, MissingExtraError if rosbags is not installed.
     """
     if schema is None or schema.encoding not in SCHEMAS:
         got = "none" if schema is None else repr(short(schema.encoding))
@@ -43,7 +43,7 @@ def decoder_of_ros2(schema: Any, topic: str) -> Callable[[bytes], Any] | str:
 
 
 def _store(types: Any, schema: Any) -> Any:
-    """Return the types of a schema, or those of ROS where it has no text."""
+    """Return a type store with the types of a schema, or with those of ROS 2 Humble if it has no text."""
     text = schema.data.decode("utf-8")
     if not text.strip():
         return types.get_typestore(types.Stores.ROS2_HUMBLE)

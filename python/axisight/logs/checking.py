@@ -1,4 +1,4 @@
-"""Looking at a log leniently: every problem is reported, none raised."""
+"""Check a log leniently: every problem is reported, none raised."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _GRAVEST = ("error", "warning", "ok")
 @summarized
 @dataclass(frozen=True)
 class LogReport:
-    """What `check_log` found; rate, samples and axes are None where they could not be found out."""
+    """The findings of `check_log`; `sample_rate_hz` (Hz), `n_samples` and `n_axes` are None if unknown."""
 
     path: Path
     findings: tuple[Finding, ...]
@@ -48,7 +48,7 @@ class LogReport:
     n_axes: int | None = None
 
     def _repr_html_(self) -> str:
-        """Every finding, errors first, for notebooks."""
+        """Return every finding, errors first, as HTML for notebooks."""
         worst_first = sorted(self.findings, key=lambda f: _GRAVEST.index(f.severity))
         rows = [(f.severity, f.column, f.message) for f in worst_first]
         known = [
@@ -62,9 +62,9 @@ class LogReport:
 
     @property
     def ok(self) -> bool:
-        """True when there is no error, so that `read_log` reads the file; warnings may remain.
+        """True if there is no error; warnings may remain.
 
-        With the robot and the `currents` that it needs.
+        `read_log` then reads the file, if it gets the robot and the option `currents` that the file needs.
         """
         return not any(finding.severity == "error" for finding in self.findings)
 
@@ -75,10 +75,11 @@ def check_log(
     *,
     max_bytes: int | None = None,
 ) -> LogReport:
-    """Report everything about a log: rate, gaps, bad values, saturation, quantization, units.
+    """Return a report on a log: rate, gaps, bad values, saturation, quantization, units.
 
-    Takes the files, `columns` (a map) and `max_bytes` that `read_log` takes. A file or map that cannot be used at all
-    gives a report with that one error.
+    `path`, `columns` (a map) and `max_bytes` are as in `read_log`. If the file or the map cannot be used at
+    all, the report has that one error; no LogError is raised. Raises InputError for a `max_bytes` that is not
+    a whole number from 1.
     """
     path = Path(path)
     try:
@@ -108,7 +109,7 @@ def check_log(
 
 
 def _without_torque(found: Gathered) -> list[Finding]:
-    """Say what can be done with positions and their targets, where no torque was logged."""
+    """Return a finding on what a diagnosis needs if only positions and their targets were logged."""
     axes = found.columns.axis
     if any(x.torque is not None or x.position_ref is None for x in axes):
         return []
@@ -121,7 +122,7 @@ def _without_torque(found: Gathered) -> list[Finding]:
 
 
 def _currents(found: Gathered) -> list[Finding]:
-    """Say what currents without a scale need."""
+    """Return findings on what a diagnosis or the reader needs for currents without a scale."""
     known = "a current without a scale: read with a robot that states its torque constant; figures here are in A"
     unknown = (
         "a current whose torque constant nobody knows: a diagnosis finds it; figures here are in A"
@@ -145,22 +146,23 @@ def _prismatic(found: Gathered) -> list[bool]:
 def look_at_signals(
     signals: Mapping[Channel, Floats], labels: Mapping[Channel, str], prismatic: Sequence[bool]
 ) -> list[Finding]:
-    """Return findings about every signal (n,) for itself: constant, saturated, quantized.
+    """Return findings about each signal (n,) on its own: constant, saturated, quantized.
 
-    `signals` and `labels` by field and axis from 0, in SI units; `prismatic` for each axis.
+    Field and axis (from 0) are the keys of `signals` (SI units) and `labels`. `prismatic` has one entry per
+    axis.
     """
     findings = []
     for channel, values in signals.items():
         field, axis = channel
         unit = _UNITS[field][int(prismatic[axis])]
-        finite = values[np.isfinite(values)]  # gaps and NaN are reported apart
+        finite = values[np.isfinite(values)]  # gaps and NaN are reported separately
         if finite.size:
             findings += check_signal(field, labels[channel], finite, unit, axis + 1)
     return findings
 
 
 def _look_at_units(found: Gathered, sample_time_s: float) -> list[Finding]:
-    """Compare the measured velocity, or else the reference, with the position of every axis."""
+    """Return findings on units from the position and the velocity (measured, else reference) of each axis."""
     findings = []
     for axis, columns in enumerate(found.columns.axis):
         position = found.signals.get(("position", axis))

@@ -202,8 +202,8 @@ class ColumnMap(_Strict):
 def describe_validation(error: ValidationError, model: type[BaseModel]) -> str:
     """Return the errors of pydantic as "field: expected ..., got ...", joined by semicolons.
 
-    Entries of lists count from 1: "axis 2: torque.unit". A key that ``model`` and its parts do not have is
-    named with the nearest one that they have.
+    Entries of lists count from 1: "axis 2: torque.unit". For an unknown key, the text proposes the nearest
+    key of ``model`` and its parts.
     """
     items = error.errors()
     # pydantic also reports a list with wrong entries as too short: that is not a second fault.
@@ -297,7 +297,7 @@ def as_unit(given: object) -> str:
 
 
 def _keys(model: type[BaseModel]) -> list[str]:
-    """Return the keys of a document of a model, and of all its parts."""
+    """Return the keys of a model and of all models inside it."""
     schema = model.model_json_schema()
     parts = [schema, *schema.get("$defs", {}).values()]
     return [key for part in parts for key in part.get("properties", ())]

@@ -12,7 +12,7 @@ from axisight.errors import InputError
 from axisight.logs.log import Floats
 
 LOWPASS_ORDER = 4
-"""Order of the low-pass, run forward and backward: of everything that is low-passed, unless it says another."""
+"""Default order of the low-pass; running it forward and backward doubles the order of the gain."""
 _DECIMATION_SHARE = 0.8
 """Cutoff of the decimation filter as a share of the new Nyquist frequency."""
 _PADDING_PERIODS = 10.0
@@ -27,15 +27,17 @@ def lowpass(
     *,
     curved: bool = False,
 ) -> Floats:
-    """Filter `x` (n,) or (n, k) along its first dimension with a zero-phase Butterworth low-pass.
+    """Return `x` (n,) or (n, k), low-passed along its first dimension by a zero-phase Butterworth filter.
 
-    The filter of `order` runs forward and backward: the gain is 1 / (1 + (f / cutoff_hz)^(2 order))
-    up to the bilinear frequency warping, so -6 dB at `cutoff_hz`. Ends are padded oddly over ten
-    periods of the cutoff, or as far as the signal reaches; ``curved``: with the curvature that it has
-    there, which the accelerations of a signal that begins or ends in motion need.
+    `sample_time_s` (s) is the step of `x`. The filter of `order` runs forward and backward: the gain is
+    1 / (1 + (f / cutoff_hz)^(2 order)) up to the bilinear frequency warping, so -6 dB at `cutoff_hz` (Hz).
+    The ends are padded by odd reflection over ten periods of the cutoff, or over the whole signal if it is
+    shorter. ``curved`` adds the curvature at each end to the padding: set it if the signal begins or ends in
+    motion and its acceleration matters.
 
-    Raises InputError when the cutoff (Hz) is not between 0 and Nyquist, when samples are too few
-    for the padding, not finite, or not of shape (n,) or (n, k).
+    Raises InputError when the cutoff is not between 0 and Nyquist, and when there are at most 3 (order + 1)
+    samples. Raises InputError for values that are not finite or not of shape (n,) or (n, k), a sample time
+    that is not positive, and an order below 1.
     """
     x = _checked(x, sample_time_s, order)
     nyquist = 0.5 / sample_time_s
@@ -50,7 +52,8 @@ def lowpass(
             f"x: expected more than {least} samples for order {order}, got {x.shape[0]}"
         )
     pad = min(x.shape[0] - 1, max(least, math.ceil(_PADDING_PERIODS / (cutoff_hz * sample_time_s))))
-    sections = _butterworth(order, cutoff_hz * sample_time_s * 2.0).copy()  # scipy wants to write
+    # A copy: scipy needs a writable array, and the cached one is read-only.
+    sections = _butterworth(order, cutoff_hz * sample_time_s * 2.0).copy()
     if curved:
         extended = _extended(x, pad, max(least, math.ceil(1.0 / (cutoff_hz * sample_time_s))))
         smooth = scipy.signal.sosfiltfilt(sections, extended, axis=0, padtype=None)
@@ -59,13 +62,13 @@ def lowpass(
 
 
 def _extended(x: Floats, pad: int, window: int) -> Floats:
-    """Return a signal with its odd reflection at both ends, plus the curvature that it has there.
+    """Return a signal padded by its odd reflection at both ends, plus the curvature at each end.
 
-    Of a parabola the reflection about an end is the parabola itself. The curvature is that of a cubic
-    through ``window`` samples.
+    So the padding continues a parabola exactly. The curvature at an end comes from a cubic fit to ``window``
+    samples.
     """
     window = min(window, x.shape[0])
-    # Second derivative of the cubic at the first of its samples, per sample squared.
+    # Second derivative of the cubic at its first sample, per sample squared.
     powers = np.vander(np.arange(window, dtype=np.float64), 4, increasing=True)
     weights = 2.0 * np.linalg.pinv(powers)[2]
     k = np.arange(1.0, pad + 1.0).reshape(-1, *[1] * (x.ndim - 1))
@@ -77,7 +80,7 @@ def _extended(x: Floats, pad: int, window: int) -> Floats:
 
 @lru_cache(maxsize=64)
 def _butterworth(order: int, cutoff: float) -> Floats:
-    """Return second-order sections; `cutoff` relative to Nyquist. Designing takes as long as filtering."""
+    """Return second-order sections, cached as design takes as long as filtering; `cutoff` over Nyquist."""
     sections = np.asarray(scipy.signal.butter(order, cutoff, output="sos"), dtype=np.float64)
     sections.setflags(write=False)
     return sections
@@ -93,9 +96,9 @@ def differentiate(
 ) -> tuple[Floats, Floats]:
     """Return velocity and acceleration of `position` (n,) or (n, k), in its unit per s and s^2.
 
-    The position is filtered by `lowpass`, then differenced centrally over one sample on either
-    side; both results are second-order accurate in the sample time, one-sided at the ends. ``curved`` and
-    InputError as of `lowpass`.
+    `lowpass` with `cutoff_hz` (Hz), `order` and ``curved`` filters the position, sampled every
+    `sample_time_s` (s). Central differences over one sample on either side follow, one-sided at the ends.
+    Both results are second-order accurate in the sample time. Raises InputError like `lowpass`.
     """
     smooth = lowpass(position, sample_time_s, cutoff_hz, order, curved=curved)
     velocity = np.gradient(smooth, sample_time_s, axis=0, edge_order=2)
@@ -107,10 +110,10 @@ def differentiate(
 
 
 def decimate_zero_phase(x: Floats, factor: int, order: int = LOWPASS_ORDER) -> Floats:
-    """Keep every `factor`-th sample of `x` (n,) or (n, k) after a zero-phase low-pass.
+    """Return every `factor`-th sample of `x` (n,) or (n, k) after a zero-phase low-pass of `order`.
 
-    The low-pass cuts at 0.8 of the new Nyquist frequency. Filtering both sides of a regression
-    alike (parallel decimation) leaves its solution unbiased. A factor of 1 copies. Raises
+    The cutoff is 0.8 of the new Nyquist frequency. Filtering both sides of a regression in the same
+    way (parallel decimation) leaves its solution unbiased. A factor of 1 returns a copy. Raises
     InputError when `factor` is not a positive integer, and like `lowpass`.
     """
     if isinstance(factor, bool) or not isinstance(factor, int | np.integer) or factor < 1:

@@ -1,4 +1,4 @@
-"""What a look at a log found."""
+"""Findings about a log, and the error made of them."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Severity = Literal["ok", "warning", "error"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One observation: how bad, about which column, and what was expected and seen.
+    """One observation about a log: severity, column, and a message with what was expected and what came.
 
-    `name` is the stable name of a fault that has one (`rows_missing`, `samples_frozen`, ...), empty
-    otherwise; `axis` counts from 1, None for what concerns all axes or none.
+    `name` is the stable name of the fault (`rows_missing`, `samples_frozen`, ...), empty if it has none.
+    `axis` counts from 1; it is None if the finding does not concern a single axis.
     """
 
     severity: Severity
@@ -28,7 +28,7 @@ class Finding:
 
 
 def raise_errors(path: Path, findings: Iterable[Finding]) -> None:
-    """Raise one LogError naming the file and its first error; say how many more there are."""
+    """Raise LogError with the file, the first error and the number of further ones, if there is any error."""
     errors = [finding for finding in findings if finding.severity == "error"]
     if not errors:
         return

@@ -1,4 +1,4 @@
-"""Samples that repeat where a machine in motion cannot: frozen channels, rows given twice."""
+"""Find samples that repeat while the machine moves: frozen channels and repeated rows."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from axisight.logs.resolution import ROUNDING
 
 Mask = NDArray[np.bool_]
 
-# Equal neighbours that make a frozen stretch. Where fewer than one neighbour in twenty is equal by
-# chance, nine equal samples have a probability of 0.05^8 = 4e-11 at each sample.
+# Pairs of equal neighbours that make a frozen stretch. If at most one pair in twenty is equal by chance,
+# nine equal samples have a probability of 0.05^8 = 4e-11 at each sample.
 _FROZEN = 8
 _CHANCE = 0.05
-# A channel that comes back to life jumps by what it missed; a sensor at rest goes on by a step of
-# its resolution, and an axis that breaks away by less than a tenth of its usual step.
+# When a frozen channel recovers, it jumps by the motion that it missed. A sensor at rest changes by one step
+# of its resolution, and an axis that breaks away changes by less than a tenth of its usual step.
 _RESOLUTIONS = 3.0
 _SHARE_OF_STEP = 0.1
 _AROUND = 50
-# Mean speed over a frozen stretch of torque, as a share of the top speed, that is a motion.
+# An axis moves during a frozen stretch of torque if its mean speed exceeds this share of the top speed.
 _TRAVEL = 0.05
-# A moving axis makes steps of several resolutions before and after a row that was given twice.
+# A moving axis makes steps of several resolutions before and after a repeated row.
 _MOVING_STEPS = 5.0
 
 
@@ -36,11 +36,11 @@ def runs(mask: Mask) -> list[tuple[int, int]]:
 
 
 def frozen_stretches(values: Floats, *, limited: bool = False) -> list[tuple[int, int]]:
-    """Return (first, last) sample of stretches over which a live channel (n,) stood still.
+    """Return (first, last) sample of every stretch over which a channel (n,) is frozen.
 
     A stretch counts if equal neighbours are rare elsewhere and the value jumps at its end by more
-    than a sensor at rest would; the start and the end of a log are rest. With `limited`, stretches
-    at the largest and the smallest value are those of a limit, not counted.
+    than a sensor at rest would. Stretches at the start and the end of a log count as rest. With `limited`,
+    stretches at the largest and the smallest value count as saturation, not as frozen.
     """
     step = np.diff(values)
     still = step == 0.0
@@ -64,7 +64,7 @@ def frozen_stretches(values: Floats, *, limited: bool = False) -> list[tuple[int
 
 
 def _resolution(step: Floats, first: int, last: int, rounding: float) -> float:
-    """Return the smallest step around a stretch, but rounding: numbers of five digits differ in theirs."""
+    """Return the smallest step around a stretch that exceeds ``rounding``; 0 if there is none."""
     around = np.abs(
         np.concatenate((step[max(0, first - _AROUND) : first], step[last + 1 : last + _AROUND]))
     )
@@ -75,10 +75,10 @@ def _resolution(step: Floats, first: int, last: int, rounding: float) -> float:
 def check_frozen(
     signals: Mapping[Channel, Floats], labels: Mapping[Channel, str], sample_time_s: float
 ) -> list[Finding]:
-    """Return a finding per measured channel that stood still while the machine was in motion.
+    """Return a finding for each measured channel that is frozen while the machine moves.
 
-    `signals` are finite, (n,) each. A torque counts as frozen only while a position moves: at
-    standstill a drive may hold the same torque for long.
+    `signals` are finite, (n,) each. A torque or velocity counts as frozen only while the position of its axis
+    moves: at standstill a drive may hold the same torque for long.
     """
     findings = []
     for channel, values in signals.items():
@@ -103,13 +103,13 @@ def check_frozen(
 
 
 def _moves(position: Floats, first: int, last: int) -> bool:
-    """Whether a position travels over a stretch: a drive at standstill may hold its torque for long."""
+    """Whether a position moves during a stretch, other than at constant speed."""
     top = float(np.quantile(np.abs(np.diff(position)), 0.99))
-    # Where position and torque are frozen together, what it missed shows at the end.
+    # One sample more: if the position is frozen too, the missed motion shows as a jump behind the stretch.
     travel = float(np.ptp(position[first : last + 2]))
     if travel <= _TRAVEL * top * (last - first):
         return False
-    # To the last step of a coarse encoder the same speed: a loop has nothing to answer.
+    # At a speed that is constant to the encoder step, the controller may hold its torque.
     steps = np.diff(position[first : last + 1])
     return not (steps[0] != 0.0 and np.ptp(steps) <= ROUNDING * float(np.abs(position).max()))
 
@@ -117,7 +117,7 @@ def _moves(position: Floats, first: int, last: int) -> bool:
 def check_repeated_rows(
     signals: Mapping[Channel, Floats], labels: Mapping[Channel, str], sample_time_s: float
 ) -> list[Finding]:
-    """Return a finding where whole rows were given twice while an axis was in motion."""
+    """Return a finding if whole rows repeat while an axis moves."""
     measured = [v for (field, _), v in signals.items() if field in ("position", "torque")]
     positions = [(c, v) for c, v in signals.items() if c[0] == "position"]
     if not positions or len(measured[0]) < 4:

@@ -1,4 +1,4 @@
-"""Taking the signals a column map names out of the arrays of a file, in SI units."""
+"""Collect the signals that a column map names from the arrays of a file, in SI units."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from axisight.robot import Robot
 
 _FIELDS = tuple(AxisColumns.model_fields)
-# Arrays as long as the stamps that looking at these takes.
+# Checking the time stamps takes this many arrays of their length.
 _TIME_COST = 4
-# What arrays may take that are in memory already.
+# No limit in effect: arrays in memory cost nothing more to read.
 _ENOUGH = 2**62
 Channel = tuple[str, int]
 """Field of an axis (`position`, `torque`, ...) and 0-based axis."""
@@ -41,12 +41,12 @@ Channel = tuple[str, int]
 
 @dataclass
 class Gathered:
-    """The signals found in SI units, each 1-D, and what was wrong with the others.
+    """The signals found, in SI units and 1-D, and findings about the others.
 
-    `doubts` are about whole files; a grid of more than `most_samples` would not keep to the budget.
-    `mapped`: by a column map that was given; `currents`: axes (from 0) whose torque is a current of the motor,
-    [A] without a robot; `unknown`: of them those whose constant nobody knows, with what they were read by
-    [Nm/A], NaN where they are as they were logged [A].
+    `doubts` concern whole files. A grid of more than `most_samples` would exceed the budget. `mapped`: the
+    caller gave a column map. `currents`: axes (from 0) whose torque was logged as a motor current; without a
+    robot it stays in A. `unknown`: those of these axes whose torque constant is unknown, with the constant of
+    the robot that converted them (Nm/A), or NaN if they are still in A.
     """
 
     path: Path
@@ -66,7 +66,7 @@ class Gathered:
 
     @property
     def notes(self) -> list[str]:
-        """What the map says of signals that were taken by it, each once."""
+        """The notes of the map on its signals, without repetition."""
         signals = [getattr(axis, name) for axis in self.columns.axis for name in _FIELDS]
         addresses: list[Address | None] = [self.columns.time, *signals]
         return list(
@@ -80,10 +80,11 @@ def gather(
     robot: Robot | None = None,
     max_bytes: int | None = None,
 ) -> Gathered:
-    """Open a log and take out every mapped signal; problems of single columns become findings.
+    """Open a log and return every mapped signal; problems with single columns become findings.
 
-    ``robot``: whose log it is; without one signals of joints stay as they are. ``max_bytes``: what all
-    mapped columns may declare. Raises LogError when the file or the map itself cannot be used.
+    ``robot``: the robot of the log; without it, joint-side signals are not converted. ``max_bytes``: limit on
+    the bytes that all mapped columns may declare. Raises LogError when the file or the map itself cannot be
+    used.
     """
     path = usable_path(path, LogError)
     given = load_column_map(columns) if isinstance(columns, Path | str) else columns
@@ -94,9 +95,9 @@ def gather(
 def gather_arrays(
     arrays: Mapping[str, NDArray[Any]], name: str, columns: AnyMap, robot: Robot | None = None
 ) -> Gathered:
-    """Take every mapped signal out of arrays that are there already; ``name`` is what messages call them.
+    """Return every mapped signal of arrays in memory; messages call the arrays ``name``.
 
-    Problems of single columns become findings, as in `gather`.
+    Problems with single columns become findings, as in `gather`.
     """
     path = Path(name)
     files = _Files(path, columns, Budget(_ENOUGH), LazyArrays.of(arrays))
@@ -130,7 +131,7 @@ def _gathered(files: _Files, path: Path, given: AnyMap | None, robot: Robot | No
 
 
 def _count_time(result: Gathered, budget: Budget) -> None:
-    """Count the time that signals without stamps get."""
+    """Count the time stamps that a log without stamps gets from its rate."""
     longest = max((values.nbytes for values in result.signals.values()), default=0)
     try:
         budget.take(2 * longest)
@@ -144,7 +145,7 @@ def _used_names(columns: ColumnMap) -> set[str]:
 
 
 def _usual_map(arrays: LazyArrays, robot: Robot | None, path: Path) -> AnyMap:
-    """Return the map of a file that comes without one: of ROS, of LeRobot, or of native columns."""
+    """Return the map of a file that needs none from the caller: ROS, LeRobot or native columns."""
     if is_lerobot(path):
         return load_column_map("lerobot")
     if is_bag(path):
@@ -152,12 +153,12 @@ def _usual_map(arrays: LazyArrays, robot: Robot | None, path: Path) -> AnyMap:
     return native_map(arrays, str(path))
 
 
-# How a motor's signal follows from the joint's, by the power of the gear ratio r (joint per motor angle).
+# Motor-side signal = joint-side signal * r ** power, with the gear ratio r = joint angle / motor angle.
 _POWERS = {"position": -1, "velocity": -1, "velocity_ref": -1, "position_ref": -1, "torque": 1}
 
 
 def _to_torques(result: Gathered, robot: Robot | None) -> None:
-    """Turn currents of motors into torques by the torque constants of their drives."""
+    """Convert motor currents to torques with the torque constants of the robot."""
     for number, columns in enumerate(result.columns.axis):
         signal = columns.torque
         if signal is None or not signal.is_current:
@@ -167,7 +168,7 @@ def _to_torques(result: Gathered, robot: Robot | None) -> None:
         constant = robot.torque_constants[number] if robot is not None and there else None
         if signal.is_unknown:
             result.unknown[number] = np.nan if constant is None else constant
-        if robot is None or not there:  # which is said by those who need one
+        if robot is None or not there:  # the caller reports a missing robot if it needs one
             continue
         if constant is None and signal.is_unknown:
             continue
@@ -186,7 +187,7 @@ def _no_constant(joint: str) -> str:
 
 
 def _to_motors(result: Gathered, robot: Robot) -> None:
-    """Turn signals of joints into those of their motors; currents are the motors' as they are."""
+    """Convert joint-side signals to the motor side; currents are motor-side already."""
     for name, axis in result.signals:
         if name == "torque" and axis in result.currents:
             continue
@@ -215,7 +216,7 @@ class _Files:
         return self._opened[address.file]
 
     def doubts(self) -> tuple[str, ...]:
-        """Return what is doubtful about any of the files, with its name where it is not the log."""
+        """Return the doubts about all files, prefixed by the file name except for the log itself."""
         siblings = [
             f"{short(name)}: {d}" for name, file in self._opened.items() for d in file.doubts
         ]
@@ -262,15 +263,15 @@ def _take_signal(files: _Files, result: Gathered, channel: Channel, signal: Any)
         result.findings.append(Finding("error", signal.label, str(error)))
         return
     factor = signal.sign * scale * si_factor(signal.unit, signal.counts_per_rev)
-    # In place: a log may take all the memory that it was allowed.
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is found later
+    # In place: the log may have used all of its budget already.
+    with np.errstate(over="ignore", invalid="ignore"):  # check_finite reports values that overflow
         values *= factor
         values += si_offset(signal.unit)
     result.signals[channel] = values
 
 
 def _vector(arrays: Mapping[str, NDArray[Any]], address: Address, budget: Budget) -> Floats:
-    """Return the addressed values as 1-D float64; raise LogError saying expected and got."""
+    """Return the addressed values as 1-D float64; raise LogError if they are missing or not numbers."""
     if address.name not in arrays:
         listed = ", ".join(map(short, list(arrays)[:12])) or "nothing"
         meant = did_you_mean(address.name, arrays)
@@ -299,7 +300,7 @@ def _vector(arrays: Mapping[str, NDArray[Any]], address: Address, budget: Budget
 
 def _numbers(vector: NDArray[Any]) -> Floats:
     if vector.dtype.kind in "biuf":
-        # Damaged numbers may be signals, of which NumPy warns; what is no number is found later.
+        # Damaged bytes may decode to signaling NaN, on which NumPy warns; check_finite reports them.
         with np.errstate(invalid="ignore"):
             return vector.astype(np.float64)
     if vector.dtype.kind == "c":
@@ -316,7 +317,7 @@ def _numbers(vector: NDArray[Any]) -> Floats:
 
 
 def _scalar(arrays: Mapping[str, NDArray[Any]], value: float | str) -> float:
-    """Return the number itself, or the scalar of that name in the file."""
+    """Return a number as it is, or the scalar in the file that a text names."""
     if not isinstance(value, str):
         return value
     found = arrays.get(value)

@@ -1,4 +1,4 @@
-"""Turning time stamps and a declared rate into one uniform time grid."""
+"""Make one uniform time grid from time stamps and a declared rate."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ RATE_TOLERANCE = 1e-4
 SHORTEST_S = 1.0
 """Shortest log that is read (s)."""
 STEPS_S = (1e-9, 1e6)
-"""Shortest and longest sample time that is read (s): of neither is any log of a machine."""
+"""Shortest and longest sample time that is read (s); logs of machines lie well inside."""
 
 
 @dataclass
 class Grid:
-    """A uniform grid; `stamps_s` are kept only when signals must be interpolated onto it.
+    """A uniform grid; `stamps_s` is None unless signals must be interpolated from the stamps onto it.
 
-    `sample_time_s` is None when no rate could be found out.
+    `sample_time_s` is None if the rate could not be determined.
     """
 
     sample_time_s: float | None = None
@@ -35,7 +35,7 @@ class Grid:
     notes: list[str] = field(default_factory=list)
 
     def error(self, column: str, message: str, name: str) -> None:
-        """Note an error of a stable name."""
+        """Add an error with its stable name to the findings."""
         self.findings.append(Finding("error", column, message, name))
 
 
@@ -49,11 +49,12 @@ def make_grid(
     resample_hz: float | None = None,
     most_samples: int = 2**62,
 ) -> Grid:
-    """Return the uniform grid of a log and what is wrong with its time stamps.
+    """Return the uniform grid of a log, with findings about its time stamps.
 
-    `time_s` (n,) in s or None, `rate_hz` declared or None, `n_samples` of the signals. Stamps
-    that are off by up to 1 % of a sample are replaced by the uniform grid. One of more than
-    `most_samples` is not made. `unmapped` is the file of a log that is read without a column map.
+    `time_s` (n,) (s) are the stamps, `rate_hz` (Hz) the declared rate, each None if unknown; `n_samples` is
+    the length of the signals. Stamps that are off by up to 1 % of a sample are replaced by the uniform grid.
+    `resample_hz` (Hz) resamples irregular stamps, unless that gives more than `most_samples`. Findings call
+    the stamps `label`. `unmapped` is the file of a log without a column map, for the advice in a message.
     """
     grid = Grid(n_samples=n_samples)
     for name, rate in (("sample_rate_hz", rate_hz), ("resample_hz", resample_hz)):
@@ -84,7 +85,7 @@ def make_grid(
 
 
 def _usable(grid: Grid, time_s: Floats, label: str) -> bool:
-    """Check that stamps are finite and increase strictly."""
+    """Return whether stamps are finite, increase strictly and have plausible steps; add the error if not."""
     if time_s.size < 2:
         grid.error(label, f"expected at least 2 time stamps, got {time_s.size}", "log_too_short")
         return False
@@ -96,7 +97,9 @@ def _usable(grid: Grid, time_s: Floats, label: str) -> bool:
             "not_finite",
         )
         return False
-    with np.errstate(over="ignore"):  # steps beyond all numbers are long ones
+    with np.errstate(
+        over="ignore"
+    ):  # an infinite step is positive, so it passes here and fails below
         back = np.flatnonzero(np.diff(time_s) <= 0)
     if back.size:
         first = int(back[0])
@@ -107,7 +110,9 @@ def _usable(grid: Grid, time_s: Floats, label: str) -> bool:
             "time_not_increasing",
         )
         return False
-    step = (time_s[-1] / time_s.size) - (time_s[0] / time_s.size)  # a difference might overflow
+    step = (time_s[-1] / time_s.size) - (
+        time_s[0] / time_s.size
+    )  # the difference first might overflow
     if not STEPS_S[0] <= step <= STEPS_S[1]:
         grid.error(
             label,
@@ -135,7 +140,7 @@ def _check_uniform(grid: Grid, time_s: Floats, label: str, unmapped: str | None)
         return
     mean = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
     drift = np.abs(time_s - time_s[0] - mean * np.arange(time_s.size)) / mean
-    # Two stamps, each off by the tolerance, enclose one step
+    # Two stamps bound a step, so its error may be twice that of one stamp.
     jitter = np.abs(steps / mean - 1.0) / 2.0
     grid.sample_time_s = _round(mean)
     if jitter.max() > JITTER_SAMPLES * (1.0 + 1e-6) or drift.max() > 0.5:
@@ -154,7 +159,7 @@ def _check_uniform(grid: Grid, time_s: Floats, label: str, unmapped: str | None)
 
 
 def _remedy(rate_hz: float, unmapped: str | None) -> str:
-    """Return what to do about stamps that are not uniform, with the lines of a column map."""
+    """Return advice for stamps that are not uniform, with the lines of a column map."""
     rate = f"{whole_rate(rate_hz):.6g}"
     where = "of the column map"
     if unmapped is not None:
@@ -209,9 +214,9 @@ def _agree(grid: Grid, rate_hz: float, label: str) -> None:
 
 
 def _round(step_s: float) -> float:
-    """Return the step of the nearest whole rate when the two differ by less than 1 ppm.
+    """Return the step of the nearest whole rate if it differs by less than 1 ppm, else the step itself.
 
-    That is the rounding of single-precision stamps, and less than any clock's accuracy.
+    Single-precision stamps round by as much, and no clock of a controller is more accurate.
     """
     rate = round(1.0 / step_s)
     if rate > 0 and abs(step_s * rate - 1.0) < 1e-6:

@@ -1,4 +1,4 @@
-"""The column map of a recording of ROS: which topic has position and effort of a robot's joints."""
+"""The column map of a ROS recording: the topic with positions and efforts of a robot's joints."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from axisight.logs.columns import ColumnMap
 if TYPE_CHECKING:
     from axisight.robot import Robot
 
-# Signals of an axis and the fields of a topic that hold them, the first two needed: joint states, and what
-# controllers of trajectories say of themselves, by the names of their newer and older messages.
+# Signal of an axis -> field of a topic; the first two of a layout are required. The layouts are joint states,
+# and the states of trajectory controllers with newer and older field names.
 _LAYOUTS: tuple[dict[str, str], ...] = (
     {"position": "position", "torque": "effort", "velocity": "velocity"},
     *(
@@ -44,12 +44,15 @@ def joint_state_map(
     where: Path,
     left_out: Sequence[str] = (),
 ) -> ColumnMap:
-    """Return the column map, joint side, of the topic with position and effort of joints, or targets of theirs.
+    """Return the joint-side column map of the topic with positions and efforts, or positions and targets.
 
-    Axes stand in the order of ``robot``, found by the names of its joints, or as the topic has them without
-    one. Targets, of the state of a trajectory controller, are looked for where no topic has efforts. Stamps
-    that are not uniform are resampled at their usual rate, which the log's notes say. Raises LogError where
-    no topic, or more than one, has what is needed, with what was left out of the recording (``left_out``).
+    ``arrays`` are the columns of the recording ``where``. Axes are in the order of the joints of ``robot``,
+    or without a robot in that of the topic. If no topic has efforts, the states of trajectory controllers
+    are searched for position targets. Irregular stamps are resampled at their mean rate; the log's notes say
+    so.
+
+    Raises LogError unless exactly one topic has all required fields of all joints. The message includes
+    ``left_out``, the reasons for topics that were not read.
     """
     wanted = None if robot is None else robot.axis_names
     shown_topics: list[str] = []
@@ -85,7 +88,7 @@ def joint_state_map(
 
 
 def _topics(arrays: Mapping[str, NDArray[Any]], layout: Mapping[str, str]) -> dict[str, list[str]]:
-    """Return the joints of every topic that has what a layout needs of some."""
+    """Return, by topic, the joints that have the two required fields of a layout."""
     first, second, *_ = layout.values()
     out: dict[str, list[str]] = {}
     for name in arrays:

@@ -1,4 +1,4 @@
-"""Positions that jump as no machine moves: rows missing, out of order, turns cut off, glitches."""
+"""Find jumps of positions that no machine makes: missing or shuffled rows, wrapped turns, glitches."""
 
 from __future__ import annotations
 
@@ -18,43 +18,44 @@ from axisight.logs.spikes import isolated_spikes
 
 Ints = NDArray[np.int64]
 
-# A speed is compared with the median of seven neighbours. No drive changes the speed of an axis by
-# three tenths of its top speed within one sample of a log that resolves the motion; for logs that
-# hardly do, and for noise, the usual deviation counts (twenty times the median: 13 standard
-# deviations).
+# A speed is compared with the median of seven neighbours. If a log resolves the motion, no drive changes
+# the speed of an axis by three tenths of its top speed within one sample. For coarse logs and for noise,
+# the limit is twenty times the median deviation (13 standard deviations).
 _NEIGHBOURS = 7
 _SHARE_OF_TOP = 0.3
 _USUAL = 20.0
-# Steps of a coarse encoder, or of numbers written with few digits, make the speed of a slow axis jump
-# by one or two of themselves.
+# On a slow axis, a coarse encoder or numbers with few digits make the speed jump by one or two steps.
 _RESOLUTIONS = 3.0
-# A step next to it that is off the same way by this share: a short motion of few samples, which a wrist
-# makes near a singular pose. What was lost, reset or glitched is off by one step alone.
+# If a neighbouring step deviates in the same direction by this share of the jump, it is a short real motion,
+# as of a wrist near a singular pose. Lost rows, resets and glitches show in one step alone.
 _SHARE_OF_JUMP = 0.4
-# Jumps this near to one another are one event; this many in it are rows out of order.
+# Jumps within so many samples are one event; from four places on, an event means rows out of order.
 _EVENT_SAMPLES = 15
 _OUT_OF_ORDER = 4
-# A full turn, up to the motion within one sample.
+# Relative tolerance of a full turn, for the motion within one sample.
 _TURN_TOLERANCE = 0.05
 
 
 @dataclass(frozen=True)
 class Jump:
-    """A step of a position that its speed does not explain: after sample `index`, of axis from 0."""
+    """A step of a position after sample `index` that its speed does not explain; `axis` counts from 0.
+
+    `size` is the step minus the median step around it, in the unit of the position.
+    """
 
     axis: int
     index: int
     size: float
     speed: float
-    """Median step per sample around it."""
+    """Median step per sample around the jump."""
 
 
 def check_jumps(
     signals: Mapping[Channel, Floats], labels: Mapping[Channel, str], sample_time_s: float
 ) -> list[Finding]:
-    """Return findings about jumps of positions, and single wrong samples of position and torque.
+    """Return findings about jumps of positions, and about single wrong samples of position and torque.
 
-    `signals` are finite, (n,) each. Jumps at the end of a frozen stretch belong to it.
+    `signals` are finite, (n,) each. A jump at the end of a frozen stretch is not reported again.
     """
     findings = []
     jumps: list[Jump] = []
@@ -89,7 +90,7 @@ def _spiked(
 
 
 def position_jumps(values: Floats, axis: int, known: list[int]) -> tuple[list[Jump], float]:
-    """Return the jumps of a position (n,), but those near samples `known`, and its top step."""
+    """Return the jumps of a position (n,) that are not near the samples `known`, and its top step."""
     step = np.diff(values)
     usual = scipy.ndimage.median_filter(step, _NEIGHBOURS, mode="nearest")
     off = step - usual
@@ -105,7 +106,7 @@ def position_jumps(values: Floats, axis: int, known: list[int]) -> tuple[list[Ju
 
 
 def _in_a_motion(off: Floats, found: Ints) -> NDArray[np.bool_]:
-    """Return which jumps are part of a speed that rises and falls over several samples."""
+    """Return a mask of the jumps whose speed rises or falls over several samples."""
     padded = np.pad(off, 1)
     beside = np.stack([padded[found], padded[found + 2]])
     return np.asarray(
@@ -166,7 +167,7 @@ def _wrapped(axis: int, label: str, values: Floats) -> Finding:
 
 
 def _events(jumps: list[Jump]) -> list[list[Jump]]:
-    """Return jumps in groups that lie together in time."""
+    """Return the jumps grouped by time, in order."""
     out: list[list[Jump]] = []
     for jump in sorted(jumps, key=lambda j: (j.index, -abs(j.size))):
         if out and jump.index - out[-1][-1].index <= _EVENT_SAMPLES:
@@ -183,7 +184,7 @@ def _name_of(event: list[Jump], tops: Mapping[int, float], positions: Mapping[in
     if len(places) >= _OUT_OF_ORDER and len(signs) == 2:
         return "rows_shuffled"
     if all(j.size * j.speed < 0 for j in event):
-        # Against the motion: what follows was taken before.
+        # A jump against the motion: the following rows were recorded earlier.
         return "rows_shuffled" if len(axes) > 1 else "position_jumps"
     return (
         "position_jumps" if len(axes) == 1 and _alone(event[0], tops, positions) else "rows_missing"
@@ -191,7 +192,7 @@ def _name_of(event: list[Jump], tops: Mapping[int, float], positions: Mapping[in
 
 
 def _alone(jump: Jump, tops: Mapping[int, float], positions: Mapping[int, Floats]) -> bool:
-    """Whether rows that were missing would have shown on another axis too, which was in motion."""
+    """Whether missing rows are ruled out, because they would also have made another axis jump."""
     rows = abs(jump.size) / max(abs(jump.speed), 1e-3 * tops[jump.axis])
     around = slice(max(0, jump.index - _NEIGHBOURS), jump.index + _NEIGHBOURS)
     return any(

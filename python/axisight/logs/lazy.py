@@ -1,4 +1,4 @@
-"""The named arrays of a file, each read only when somebody asks for it."""
+"""The named arrays of a file, each read at the first access."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from axisight.arguments import short
 from axisight.errors import LogError, MissingExtraError
 
 Reader = Callable[[], NDArray[Any]]
-"""Reads one array; it holds what the file declares against a budget before."""
+"""Function that reads one array, after it has counted the declared size against a budget."""
 
 
 class LazyArrays(Mapping[str, NDArray[Any]]):
     """Arrays by (dotted) name; scalars are 0-dimensional.
 
-    Names are known at once, values are read by the first access and kept. An access raises KeyError for
-    an unknown name, LogError where the values cannot be read. ``doubts`` are said of the whole file.
+    Names are known at once; the first access reads the values and keeps them. An access raises KeyError for
+    an unknown name and LogError if the values cannot be read. ``doubts`` concern the whole file.
     """
 
     def __init__(self, readers: Mapping[str, Reader], doubts: tuple[str, ...] = ()) -> None:
@@ -29,11 +29,11 @@ class LazyArrays(Mapping[str, NDArray[Any]]):
 
     @classmethod
     def of(cls, arrays: Mapping[str, NDArray[Any]]) -> LazyArrays:
-        """Return arrays that are there already."""
+        """Wrap arrays that are in memory already."""
         return cls({name: given(values) for name, values in arrays.items()})
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """Return an array, reading it when it is asked for first."""
+        """Return an array; the first access reads it."""
         if name not in self._read:
             read = self._readers[name]
             try:
@@ -45,7 +45,7 @@ class LazyArrays(Mapping[str, NDArray[Any]]):
         return self._read[name]
 
     def readable(self) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
-        """Read everything; return what could be read, and of the rest by name why not."""
+        """Read everything; return the arrays that could be read, and the reasons for the others, by name."""
         found: dict[str, NDArray[Any]] = {}
         others: dict[str, str] = {}
         for name in self:
@@ -56,7 +56,7 @@ class LazyArrays(Mapping[str, NDArray[Any]]):
         return found, others
 
     def __contains__(self, name: object) -> bool:
-        """Say whether the file has a name, without reading it."""
+        """Return whether the file has an array of that name, without reading it."""
         return name in self._readers
 
     def __iter__(self) -> Iterator[str]:
@@ -69,7 +69,7 @@ class LazyArrays(Mapping[str, NDArray[Any]]):
 
 
 def unreadable(error: Exception, kind: str = "") -> str:
-    """Return what is said of a file (of a kind) whose reader raised an error."""
+    """Return the message for a file (of a ``kind``) whose reader raised an error."""
     if isinstance(error, MemoryError):
         return "truncated, corrupt or too large for memory"
     reason = str(error).splitlines()[0] if str(error).strip() else type(error).__name__
@@ -80,7 +80,7 @@ def unreadable(error: Exception, kind: str = "") -> str:
 
 
 def refusing(message: str) -> Reader:
-    """Return a reader of what cannot be read, for files that have it without anybody asking for it."""
+    """Return a reader that raises LogError, so that an unreadable array matters only if a map needs it."""
 
     def refuse() -> NDArray[Any]:
         raise LogError(message)
@@ -89,5 +89,5 @@ def refusing(message: str) -> Reader:
 
 
 def given(values: NDArray[Any]) -> Reader:
-    """Return a reader of values that are there already."""
+    """Return a reader of values that are in memory already."""
     return lambda: np.asarray(values)

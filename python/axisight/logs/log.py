@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 AxisKind = Literal["revolute", "prismatic"]
 
 RESAMPLED = "resampled linearly"
-"""How the note of a log starts whose irregular time stamps were interpolated."""
+"""First words of the note on a log whose irregular time stamps were interpolated."""
 
 # Log field -> (name in the Dataset, unit of a revolute axis, unit of a prismatic axis)
 _VARIABLES = {
@@ -39,7 +39,7 @@ _VARIABLES = {
 
 
 def not_logged(shape: tuple[int, ...]) -> Floats:
-    """Return the torque of a log without one."""
+    """Return the torque of a log without torque: NaN of this shape (n, axes)."""
     return np.full(shape, np.nan)
 
 
@@ -49,20 +49,20 @@ class Log:
     """A run of `n` samples on `axes` driven axes.
 
     `time_s` has shape (n,), starts at 0 and is uniform with step `sample_time_s` (s). Every other
-    array has shape (n, axes): motor-side `position_rad` (rad), `torque_nm` (Nm; NaN throughout where
-    it was not logged), `position_ref_rad` (rad, targets of the position), `velocity_ref_rad_s` and
+    array has shape (n, axes): motor-side `position_rad` (rad), `torque_nm` (Nm; all NaN if it was not
+    logged), `position_ref_rad` (rad, targets of the position), `velocity_ref_rad_s` and
     `velocity_rad_s` (rad/s), joint-side `joint_position_rad` (rad) and `temperature_c` (degC).
     Optional arrays are None when the log has none of them; a measured optional array holds NaN in
     the columns of axes without that sensor. On an axis whose `axis_kinds` entry is "prismatic", rad
     reads m and Nm reads N.
 
     `start_rad` (axes,) (rad) are the driven joint angles at which a simulation of this run starts, at
-    rest; None is the robot's operating point. `run_up` is what a simulation goes through before this
-    run where that begins in motion; None where it begins at rest.
+    rest; None means the robot's operating point. `run_up` is the simulated motion before a run that begins in
+    motion; None if the run begins at rest.
 
-    `nominal_nm_a` (axes,) is, of an axis whose torque is a current that was read by a torque constant nobody
-    knows, that constant (Nm/A), NaN where `torque_nm` is still the current (A), and None of other axes; it may be
-    left out where all torques are known.
+    `nominal_nm_a` (axes,) concerns axes whose torque was logged as a current with an unknown torque constant.
+    For such an axis it is the constant (Nm/A) by which `torque_nm` was computed, or NaN if `torque_nm` is
+    still the current (A). For other axes it is None; it may be empty if no axis is of this kind.
 
     `period_s` is the excitation's period (s) when it is periodic. `notes` says what reading changed
     (time grid replaced, resampled). Raises InputError when shapes disagree.
@@ -123,7 +123,7 @@ class Log:
         return f"Log {self._title()}", [*rows, ("from", str(self.source))]
 
     def _repr_html_(self) -> str:
-        """Signals with unit and range on every axis, for notebooks."""
+        """Return the signals with unit and range on every axis as HTML, for notebooks."""
         head = ("signal", "axis", "unit", "least", "largest")
         return html.page(
             self._title(),
@@ -138,7 +138,7 @@ class Log:
         )
 
     def _ranges(self) -> list[tuple[str, ...]]:
-        """Return signal, axis, unit, least and largest value of what was logged."""
+        """Return signal, axis, unit, smallest and largest value of every signal that was logged."""
         rows = []
         for field, (name, _, _) in _VARIABLES.items():
             found = getattr(self, field)
@@ -180,13 +180,13 @@ class Log:
 
     @property
     def lead(self) -> int:
-        """Number of samples of the run-up."""
+        """Number of samples of the run-up; 0 without one."""
         return 0 if self.run_up is None else self.run_up.n_samples
 
     def led(self, field: Literal["position_rad", "torque_nm", "velocity_ref_rad_s"]) -> Floats:
-        """Return a signal of the run-up and the run (lead + n, axes).
+        """Return a signal `field` (lead + n, axes) of the run-up followed by the run.
 
-        Raises InputError where the log has none.
+        Raises InputError if the log does not have the signal.
         """
         own: Floats | None = getattr(self, field)
         if own is None:
@@ -198,18 +198,18 @@ class Log:
 
     @property
     def is_resampled(self) -> bool:
-        """Whether reading interpolated irregular stamps: rows are not those that were recorded."""
+        """Whether reading interpolated irregular stamps, so that the rows differ from the recorded ones."""
         return any(note.startswith(RESAMPLED) for note in self.notes)
 
     @property
     def duration_s(self) -> float:
-        """Samples times sample time (s): a whole period of n samples lasts n sample times."""
+        """Number of samples times the sample time (s), so that a period of n samples lasts n sample times."""
         return self.n_samples * self.sample_time_s
 
     def part(self, start_s: float = 0.0, stop_s: float | None = None) -> Log:
-        """Return the samples from `start_s` to before `stop_s` (s), time starting at 0 again.
+        """Return a log of the samples from `start_s` to before `stop_s` (s), time starting at 0 again.
 
-        None is the end of the log, and so is a time after it. A part shorter than the period is
+        A `stop_s` of None, or after the end, means the end of the log. A part shorter than the period is
         not periodic. Raises InputError for times that are not in order, a start after the end, and
         less than one second between.
         """
@@ -219,7 +219,7 @@ class Log:
             raise InputError(
                 f"start_s: expected less than {min(stop, self.duration_s):g} s, got {start:g} s"
             )
-        # Times are meant to the sample; rounding errors of a hundredth of one are not.
+        # Callers mean whole samples: a hundredth of a sample absorbs their rounding errors.
         first, last = (math.ceil(t / self.sample_time_s - 0.01) for t in (start, stop))
         last = min(last, self.n_samples)
         seconds = (last - first) * self.sample_time_s
@@ -246,7 +246,7 @@ class Log:
     def to_xarray(self) -> xr.Dataset:
         """Return a Dataset with dims (time, axis), 1-based `axis`, `units` and provenance attrs.
 
-        Where axes of both kinds are mixed, `units` lists one unit per axis.
+        If units differ between axes, `units` lists one unit per axis.
         """
         variables = {}
         for field, (name, _, _) in _VARIABLES.items():

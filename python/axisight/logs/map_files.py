@@ -1,4 +1,4 @@
-"""Column maps as files: written by users, or shipped with the package under a name."""
+"""Read column maps from files, or by name from the maps shipped with the package."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from axisight.logs.maps import MAPS
 from axisight.logs.patterns import ColumnPattern
 
 AnyMap = ColumnMap | ColumnPattern
-"""A map of so many axes, or one for any number of them."""
+"""A map for a fixed number of axes, or for any number."""
 
 
 def parse_column_map(text: str, where: str = "column map") -> AnyMap:
-    """Parse the TOML `text` of a column map. Raises LogError naming `where` and each bad field."""
+    """Return the column map of the TOML `text`; raise LogError naming `where` and each bad field."""
     try:
         content = parse_toml(text)
         kind = ColumnPattern if "every_axis" in content else ColumnMap
@@ -32,7 +32,7 @@ def parse_column_map(text: str, where: str = "column map") -> AnyMap:
 
 
 def needs_robot(columns: AnyMap) -> bool:
-    """Whether signals can only be read with the robot: those of joints, and currents without a scale."""
+    """Whether reading needs the robot: for joint-side signals, or for currents without a scale."""
     if isinstance(columns, ColumnPattern):
         torques = columns.every_axis.torque
     else:
@@ -41,7 +41,7 @@ def needs_robot(columns: AnyMap) -> bool:
 
 
 def named_map_text(name: str) -> str:
-    """Return the TOML of a map that ships with the package. Raises LogError listing their names."""
+    """Return the TOML of the shipped map `name`; raise LogError, listing the names, for an unknown one."""
     if name not in MAPS:
         meant = did_you_mean(name, MAPS)
         raise LogError(f"column map: expected one of {', '.join(MAPS)}, got {shown(name)}{meant}")
@@ -49,10 +49,10 @@ def named_map_text(name: str) -> str:
 
 
 def load_column_map(path: Path | str) -> AnyMap:
-    """Read a column map file, or the shipped one of that name (`ur-rtde`, `franka`, ...).
+    """Return the column map in a file, or the shipped map of that name (`ur-rtde`, `franka`, ...).
 
-    Raises LogError when it cannot be read or is not valid; for a file that is not there with the names
-    of the shipped ones.
+    Raises LogError when the file cannot be read or is not valid. If the file is missing, the message lists
+    the shipped maps.
     """
     if str(path) in MAPS:
         return parse_column_map(named_map_text(str(path)), where=str(path))
@@ -68,7 +68,7 @@ def load_column_map(path: Path | str) -> AnyMap:
 
 
 def column_file(path: Path) -> Path:
-    """Return the file that `load_column_map` reads for a path or a name."""
+    """Return the file that `load_column_map` reads for a path or the name of a shipped map."""
     return Path(str(_shipped(str(path)))) if str(path) in MAPS else path
 
 

@@ -1,4 +1,4 @@
-"""The rate at which irregular stamps are put on a grid when nobody states one."""
+"""The rate for resampling irregular stamps if the user states none."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from axisight.errors import LogError
 from axisight.logs.log import Floats
 
-# Stamps that are further off a uniform grid than this share of a step are put on one.
+# Stamps further off a uniform grid than this share of a step are resampled.
 _UNIFORM = 0.01
-# A step this many times the usual one is a hole, which nobody should bridge unasked.
+# A step of this many median steps is a hole, to be bridged only if the user asks for it.
 _HOLE = 5.0
 
 
 def mean_rate_hz(time_s: Floats, where: str) -> float | None:
-    """Return the mean rate of stamps (n,) [s]; None where they are uniform, or not usable anyway.
+    """Return the mean rate [Hz] of stamps ``time_s`` (n,) [s]; None if they are uniform or unusable.
 
-    Raises LogError, naming the column ``where`` they stand, for a hole.
+    Raises LogError, naming the column ``where``, for a hole.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         steps = np.diff(time_s)
@@ -36,10 +36,10 @@ def mean_rate_hz(time_s: Floats, where: str) -> float | None:
             f"{time_s[int(np.argmax(steps))]:.6g} s; cut the recording there, or bridge it by a column "
             f"map with resample_hz"
         )
-    # The mean: single late messages do not count.
+    # The mean over the whole log, because single late messages hardly change it.
     return whole_rate(1.0 / mean)
 
 
 def whole_rate(rate_hz: float) -> float:
-    """Return the whole number nearest to a rate that was measured, where that is within a hundredth."""
+    """Return the nearest whole number if it is within 1 % of a measured rate [Hz], else the rate itself."""
     return float(round(rate_hz)) if abs(round(rate_hz) / rate_hz - 1.0) < 0.01 else rate_hz

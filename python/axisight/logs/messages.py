@@ -1,4 +1,4 @@
-"""Messages of recordings as numbers by name, whoever wrote them."""
+"""Convert the messages of recordings of any format to named series of numbers."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from axisight.arguments import short
 from axisight.logs.budget import Budget
 from axisight.logs.lazy import Reader, given, refusing
 
-# Fields that hold the names of what the other arrays of a message have in order.
+# Fields with the joint names; the other arrays of the message are in their order.
 _NAMES = ("name", "joint_names", "names")
-# Arrays that have one number a joint, or none.
+# Arrays with one number per joint, or empty.
 _OF_JOINTS = (
     *("position", "velocity", "effort", "acceleration"),
     *("positions", "velocities", "efforts", "accelerations"),
 )
 _JOINTS = "joints"
-# Where the time of a message stands: it is no signal.
+# Fields with the time of a message, which are not signals.
 _STAMPS = ("header", "stamp", "timestamp")
 _SECONDS, _NANOSECONDS = ("sec", "secs", "seconds"), ("nanosec", "nsec", "nsecs", "nanos")
 _DEEPEST = 4
 _MOST_UNNAMED = 64
-# Bytes that a number of a message takes until all messages are there.
+# Bytes that a number takes in memory until all messages are read.
 _NUMBER_COST = 64
 
 
 class Topics:
-    """What messages of all topics say, each topic and set of joints a series.
+    """The numbers in the messages of all topics, one series per topic and set of joints.
 
-    Numbers count against ``budget`` as messages come.
+    Each message counts against ``budget`` when it is added.
     """
 
     def __init__(self, budget: Budget) -> None:
@@ -41,10 +41,10 @@ class Topics:
         self._series: dict[tuple[str, frozenset[str]], _Series] = {}
 
     def add(self, topic: str, received_ns: int, message: Any, *, numbered: bool = False) -> None:
-        """Add a message, a dataclass or a dictionary; its time is its stamp, or when it was received.
+        """Add a message, a dataclass or a dictionary; its time is its stamp, else ``received_ns`` (ns).
 
-        ``numbered``: arrays without names have numbers for names, from 0 on. What is wrong with a field is
-        said, by topic and time, to those who ask for it.
+        ``numbered``: entries of arrays without names are named by number from 0. A fault in a field is
+        reported, with topic and time, only when that field is read. Raises LogError when the budget is spent.
         """
         names = _names(message)
         walk = _Walk(names, numbered=numbered and not names)
@@ -55,12 +55,12 @@ class Topics:
         self._series.setdefault(key, _Series()).add(_stamp_ns(message, received_ns), row)
 
     def drop(self, topic: str) -> None:
-        """Forget what messages of a topic said."""
+        """Delete all series of a topic."""
         label = topic.strip("/").replace("/", ".")
         self._series = {key: one for key, one in self._series.items() if key[0] != label}
 
     def readers(self) -> dict[str, Reader]:
-        """Return what reads the columns of all series; of a topic those of other joints are ``topic#2``."""
+        """Return a reader for every column; a second series of a topic, for other joints, is ``topic#2``."""
         out: dict[str, Reader] = {}
         seen: dict[str, int] = {}
         for (topic, _), one in self._series.items():
@@ -73,11 +73,11 @@ class Topics:
 
 
 def said_of(topic: str, time_ns: int) -> str:
-    """Return how a message is called."""
+    """Return the words by which errors call a message."""
     return f"topic {short(topic)}: message of {time_ns * 1e-9:.6f} s"
 
 
-# A number, or why there is none.
+# A number, or the reason why there is none.
 _Value = float | str
 
 
@@ -93,7 +93,7 @@ class _Series:
         self.rows.append(row)
 
     def columns(self, topic: str) -> dict[str, Reader]:
-        """Return what reads the columns that any message has; none without a column."""
+        """Return a reader for every column that any message has, and for the time [s]; {} without columns."""
         names = dict.fromkeys(name for row in self.rows for name in row)
         if not names:
             return {}
@@ -129,14 +129,14 @@ def _fields(message: Any) -> Mapping[str, Any]:
 
 
 def _stamp_ns(message: Any, received_ns: int) -> int:
-    """Return when a message says that it was, when it was recorded where it does not."""
+    """Return the time stamp in a message (ns), or when it was received if it has none."""
     fields = _fields(message)
     stamps = [_fields(fields.get("header")).get("stamp"), *map(fields.get, _STAMPS[1:])]
     for stamp in stamps:
         parts = _fields(stamp)
         seconds = next((parts[key] for key in _SECONDS if key in parts), None)
         rest = next((parts[key] for key in _NANOSECONDS if key in parts), 0)
-        # Numbers of NumPy are whole by this too.
+        # Not `int`: integers of NumPy count too.
         if isinstance(seconds, SupportsIndex) and isinstance(rest, SupportsIndex):
             said = index(seconds) * 1_000_000_000 + index(rest)
             if 0 < said < 2**63:
@@ -145,7 +145,7 @@ def _stamp_ns(message: Any, received_ns: int) -> int:
 
 
 class _Walk:
-    """A way through a message; ``found``: names of objects in lists, that each have one."""
+    """A walk through the fields of a message; ``found`` collects the names of joints met on the way."""
 
     def __init__(self, names: Sequence[str], *, numbered: bool) -> None:
         self.names = names
@@ -155,7 +155,7 @@ class _Walk:
     def numbers(
         self, message: Any, prefix: str = "", depth: int = 0
     ) -> Iterator[tuple[str, _Value]]:
-        """Yield every number of a message with its name; of an array as long as the joints by joint."""
+        """Yield every number of a message with its name, which ends in the joint for arrays over joints."""
         for key, value in _fields(message).items():
             if key in _NAMES or (key in _STAMPS[: 1 if depth else None] and _fields(value)):
                 continue
@@ -169,14 +169,14 @@ class _Walk:
                 if all(isinstance(one, bool | int | float) for one in value):
                     yield from self._array(key, label, value)
                 elif depth < _DEEPEST:
-                    # The joints of foxglove.JointStates are called as those of ROS.
+                    # So joints of foxglove.JointStates get the same names as those of ROS.
                     place = "" if key == _JOINTS and not depth else f"{label}."
                     yield from self._objects(place, value, depth)
             elif _fields(value) and depth < _DEEPEST:
                 yield from self._nested(value, f"{label}.", depth + 1)
 
     def _nested(self, value: Any, prefix: str, depth: int) -> Iterator[tuple[str, _Value]]:
-        """Yield the numbers of an object, by its own names of joints where it has them."""
+        """Yield the numbers of an object; its own joint names, if any, replace those of the message."""
         names = _names(value)
         if not names:
             yield from self.numbers(value, prefix, depth)
@@ -201,7 +201,7 @@ class _Walk:
     def _objects(
         self, place: str, values: Sequence[Any], depth: int
     ) -> Iterator[tuple[str, _Value]]:
-        """Yield the numbers of objects that each have a name of their own: ``place.field.NAME``."""
+        """Yield the numbers of named objects as ``place.field.NAME``; nothing if one of them has no name."""
         names = [_fields(one).get("name") for one in values]
         if not all(isinstance(name, str) for name in names):
             return
@@ -215,7 +215,7 @@ class _Walk:
 
 
 def _doubled(names: Sequence[str]) -> str:
-    """Return what is wrong with names that are not all different."""
+    """Return the message for names with a repetition."""
     twice = next(name for k, name in enumerate(names) if name in names[:k])
     return f"expected names that differ, got {short(twice)!r} twice"
 

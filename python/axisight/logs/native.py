@@ -20,7 +20,7 @@ NATIVE_STEMS = {
     "joint_position": ("joint_position", "rad"),
     "temperature": ("temperature_c", "degC"),
 }
-# Columns of other names that a message lists.
+# A message lists at most this many columns with other names.
 _SHOWN = 12
 _PATTERN = re.compile(
     r"^(" + "|".join(stem for stem, _ in NATIVE_STEMS.values()) + r")_([1-9][0-9]*)$"
@@ -28,14 +28,14 @@ _PATTERN = re.compile(
 
 
 def native_map(names: Iterable[str], where: str) -> ColumnMap:
-    """Return the column map of a file whose columns bear the native `names`.
+    """Return the column map of a file whose columns have the native `names`.
 
-    The number of axes is the highest axis number that any native column has. Raises LogError, naming the
-    file `where`, when no native column is there at all, or none of an axis below the highest.
+    The number of axes is the highest axis number of any native column. Raises LogError, naming the
+    file `where`, if there is no native column at all, or none of an axis below the highest.
     """
     present = set(names)
     matches = [match for name in present if (match := _PATTERN.match(name))]
-    # Nine digits are enough to be more than any file has, and few enough to count with.
+    # Nine digits exceed the axes of any file, and keep huge numbers in names from costing time.
     numbers = {int(match.group(2)[:9]): match.group(0) for match in matches}
     if not numbers:
         listed = ", ".join(map(short, sorted(present)[:_SHOWN])) or "nothing"
@@ -54,7 +54,7 @@ def native_map(names: Iterable[str], where: str) -> ColumnMap:
             f"{short(numbers[highest])}), got none of axis {missing}"
         )
     stems = {match.group(1) for match in matches}
-    # Targets of positions stand in for torques where there are none at all.
+    # Without any torque, targets of positions are required instead.
     required = {"position", "torque"}
     if "position_ref" in stems and "torque_cmd" not in stems:
         required = {"position", "position_ref"}

@@ -1,8 +1,8 @@
-"""What the footer of a Parquet file declares of its columns, read without pyarrow.
+"""Read what the footer of a Parquet file declares about its columns, without pyarrow.
 
-pyarrow reads the same, and so does all of the data; but where a histogram in a footer is damaged, asking
-it for a column's metadata ends the process (pyarrow 26: an exception of its C++ part that nothing catches).
-The footer is one struct of Thrift's compact protocol: numbers of seven bits a byte, fields by their numbers.
+pyarrow reads the data itself. But if a histogram in the footer is damaged, asking pyarrow for the metadata of
+a column ends the process (pyarrow 26: nothing catches an exception of its C++ part). The footer is one struct
+of Thrift's compact protocol: integers with seven bits per byte, fields by number.
 Source: the specifications of Apache Parquet (parquet.thrift) and Apache Thrift (compact protocol).
 """
 
@@ -16,20 +16,20 @@ from typing import Any
 from axisight.errors import LogError
 
 _MAGIC = b"PAR1"
-# Parquet's own structs and lists are ten deep.
+# The structs and lists of Parquet itself nest ten deep.
 _DEEPEST = 16
 _TRUE, _FALSE, _BYTE, _I16, _I32, _I64, _DOUBLE, _BINARY, _LIST, _SET, _MAP, _STRUCT, _UUID = range(
     1, 14
 )
 _FIXED = {_BYTE: 1, _DOUBLE: 8, _UUID: 16}
-# Numbers of fields.
+# Field numbers in parquet.thrift.
 _ROW_GROUPS, _COLUMNS, _METADATA = 4, 1, 3
 _PATH, _VALUES, _UNPACKED = 3, 5, 6
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """What a file declares of a column in one group of rows: dotted path, values, bytes unpacked."""
+    """What a file declares about a column in one row group: dotted path, values, uncompressed bytes."""
 
     path: str
     values: int
@@ -37,7 +37,7 @@ class Chunk:
 
 
 def chunks(path: Path) -> Iterator[Chunk]:
-    """Yield what a file declares of every column of every group of rows. Raises LogError for damage."""
+    """Yield what a file declares about each column of each row group; raise LogError for a damaged footer."""
     try:
         footer = _Compact(_footer(path)).struct()
         for group in footer.get(_ROW_GROUPS, []):
@@ -62,19 +62,19 @@ def _footer(path: Path) -> bytes:
 
 
 class _Compact:
-    """A reader of one message; IndexError where it ends too early."""
+    """A reader of one message in the compact protocol; raises IndexError if the message ends too early."""
 
     def __init__(self, data: bytes) -> None:
         self.data, self.at, self.depth = data, 0, 0
 
     def struct(self) -> dict[int, Any]:
-        """Return the fields of a struct by their numbers."""
+        """Return the fields of a struct by number."""
         fields: dict[int, Any] = {}
         number = 0
         while head := self._byte():
             step, kind = head >> 4, head & 15
             number = number + step if step else self._signed()
-            # Of truths the field's kind is the value.
+            # The kind of a boolean field is its value.
             fields[number] = kind == _TRUE if kind in (_TRUE, _FALSE) else self._value(kind)
         return fields
 

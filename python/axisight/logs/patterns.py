@@ -1,4 +1,4 @@
-"""Column maps for any number of axes: names with the place of the axis in them, and alternatives."""
+"""Column maps for any number of axes: names with a placeholder for the axis, and alternatives."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from axisight.robot import Robot
 
 _PLACE = re.compile(r"\{(0|1|joint)\}")
-# What makers who write SI for either kind of joint mean on one that slides.
+# Unit of a revolute axis -> unit on a prismatic axis, for makers that use SI for both kinds.
 _SLIDING = {"rad": "m", "rad/s": "m/s", "Nm": "N"}
 _SHOWN = 12
 
@@ -51,10 +51,10 @@ class _Strict(BaseModel):
 
 
 class AxisPattern(_Strict):
-    """The signals of every driven axis: one address each, or alternatives of which a file has one.
+    """The signals of every driven axis: one address each, or several alternatives.
 
-    In a name `{0}` is the number of the axis counted from 0, `{1}` that counted from 1, and
-    `{joint}` the name of its joint: that of the robot, or as it comes in the file without one.
+    In a name `{0}` stands for the number of the axis from 0, `{1}` for the number from 1, and `{joint}` for
+    the name of its joint: from the robot, or without a robot from the file. Each name has one of them.
     """
 
     position: Annotated[tuple[PositionColumn, ...], BeforeValidator(_listed), Field(min_length=1)]
@@ -75,7 +75,7 @@ class AxisPattern(_Strict):
 class ColumnPattern(_Strict):
     """A column map with one `[every_axis]` in place of its `[[axis]]`.
 
-    `axes` is the number of axes; without it, as many as the file has columns of the position for.
+    `axes` is the number of axes; by default the number of position columns in the file.
     Everything else is as in `ColumnMap`.
     """
 
@@ -94,11 +94,11 @@ class ColumnPattern(_Strict):
         return self
 
     def for_file(self, arrays: Iterable[str], robot: Robot | None, where: Path) -> ColumnMap:
-        """Return the map of the file that has the names ``arrays``.
+        """Return the column map for a file with the names ``arrays``.
 
-        Of alternatives it takes the first that the file has; signals that it has not are left out.
-        ``robot``: names and kinds of joints. Raises LogError naming the file, ``where``, what was
-        looked for and what is there, when no position is.
+        The first alternative that the file has counts; signals that the file lacks are left out.
+        ``robot`` gives names and kinds of joints. Raises LogError, naming the file ``where``, the names
+        looked for and the names found, if the file has no position or lacks one between two axes.
         """
         names = list(arrays)
         joints = self._joints(names, robot, where)
@@ -128,14 +128,17 @@ class ColumnPattern(_Strict):
         )
 
     def looked_for(self, field: str, robot: Robot | None = None) -> str:
-        """Return the names of a ``field`` of the first axis, as messages show them; "" without any."""
+        """Return the names of a ``field`` for the first axis, for messages; "" if the map lacks the field.
+
+        ``robot`` gives the name of the first joint; without a robot it is JOINT.
+        """
         joint = robot.axis_names[0] if robot is not None else "JOINT"
         return " or ".join(_filled(s.name, 0, [joint]) for s in getattr(self.every_axis, field))
 
     def _joints(self, names: Sequence[str], robot: Robot | None, where: Path) -> list[str] | None:
-        """Return one name per axis, those of joints where they are known; None without a position.
+        """Return one joint name per axis, "" for unknown ones; None if the file has no position.
 
-        Raises LogError where axes have numbers beyond those that follow each other.
+        Raises LogError if the numbers of the axes have a gap.
         """
         own = [""] * 0 if robot is None else list(robot.axis_names)
         for signal in self.every_axis.position:
@@ -147,7 +150,7 @@ class ColumnPattern(_Strict):
                 if found and (not own or set(own) & set(found)):
                     return own or found
                 continue
-            # Nine digits are enough to be more than any file has, and few enough to count with.
+            # Nine digits exceed the axes of any file, and keep huge numbers in names from costing time.
             numbers = {int(number[:9]) + 1 - int(place) for number in found} - {0}
             highest = max(numbers, default=0)
             if highest > len(numbers):

@@ -1,4 +1,4 @@
-"""Looks at one signal: stuck, saturated, coarsely quantized."""
+"""Check a single signal: constant, saturated, coarsely quantized."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from axisight.logs.findings import Finding, Severity
 from axisight.logs.log import Floats
 
 SATURATED_SAMPLES = 5
-"""Consecutive samples at the extreme that make one saturation."""
+"""Consecutive samples at the extreme that count as one saturation."""
 SATURATED_RUNS = 2
-"""Saturations at the same extreme that are no accident."""
+"""Saturations at the same extreme from which on a signal counts as saturated."""
 COARSE_LEVELS = 256
-"""A moving signal with fewer levels over its range is called coarse."""
+"""A signal with fewer levels over its range counts as coarse."""
 
 
 @dataclass(frozen=True)
 class Quantization:
-    """Estimated step, in the signal's SI unit, and log2 of the levels that the range holds."""
+    """Estimated step, in the signal's SI unit, and log2 of the number of levels in its range (bits)."""
 
     step: float
     bits: float
 
 
 def is_constant(values: Floats) -> bool:
-    """Tell whether every value is the same."""
+    """Return whether all values (n,) are equal; False without any."""
     return values.size > 0 and bool(np.ptp(values) == 0.0)
 
 
 def saturation_runs(values: Floats) -> tuple[int, int]:
-    """Count runs of at least 5 equal samples at the minimum and at the maximum of `values` (n,)."""
+    """Return the numbers of runs of at least 5 samples at the minimum and at the maximum of `values` (n,)."""
     return _runs(values == values.min()), _runs(values == values.max())
 
 
@@ -42,9 +42,9 @@ def _runs(mask: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> int:
 
 
 def quantization(values: Floats) -> Quantization | None:
-    """Estimate the step of quantized `values` (n,); None when they look continuous.
+    """Return the step of quantized `values` (n,); None if they look continuous.
 
-    The smallest distance between distinct values is the step when the other distances are whole
+    The step is the smallest distance between distinct values, if the other distances are whole
     multiples of it.
     """
     levels = np.unique(values)
@@ -67,9 +67,10 @@ def quantization(values: Floats) -> Quantization | None:
 def check_signal(
     field: str, label: str, values: Floats, unit: str, axis: int | None = None
 ) -> list[Finding]:
-    """Return findings about one finite signal (n,) in SI `unit`, of an `axis` from 1.
+    """Return findings about one finite signal `values` (n,) in SI `unit`, of an `axis` from 1.
 
-    Saturation is looked for in torque only: positions rest and references run at their extremes.
+    Only torques (`field`) are checked for saturation, because positions rest at their extremes and references
+    stay there on purpose.
     """
     if is_constant(values):
         message = f"constant at {values[0]:.6g} {unit} over all {values.size} samples"

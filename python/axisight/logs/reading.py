@@ -1,4 +1,4 @@
-"""Reading a log strictly: it is right, or a LogError says what is wrong."""
+"""Read a log strictly: any fault raises LogError."""
 
 from __future__ import annotations
 
@@ -30,24 +30,32 @@ def read_log(
     max_bytes: int | None = None,
     currents: bool = False,
 ) -> Log:
-    """Read a log by its suffix: .parquet, .csv, .mat (v5, v7.3), .h5, .hdf5, .npz, .mcap, .bag or .db3.
+    """Return a log in SI units on a uniform time grid that starts at 0.
 
-    `columns` is a column map, the path of one, the name of one that ships with the package (`ur-rtde`,
-    `franka`, ...), or None for a file with the native column names of `axisight.case/1`, a recording of
-    ROS (a rosbag2 may be its folder) or a folder of LeRobot (`folder#3` is its episode 3).
-    `robot` is the one it is a log of:
-    its axes are found by the names of its joints in recordings, its gear ratios turn signals
-    of joints into those of motors, and its torque constants currents without a scale into torques.
-    `n_axes` is the number of driven axes the caller expects, those of the robot unless given. Only columns
-    that are mapped are read, and none that would take more than `max_bytes` together, as they are read and
-    as signals; by default 64 MiB and sixteen times the size of the files. `currents`: a current whose torque
-    constant nobody knows (scale "unknown") is taken, for a diagnosis, which finds it.
-    The result is in SI units on a uniform grid that starts at 0.
+    The suffix of `path` chooses the format: .parquet, .csv, .mat (v5, v7.3), .h5, .hdf5, .npz, .mcap, .bag or
+    .db3. A rosbag2 or LeRobot log is a folder; `folder#3` is episode 3 of a LeRobot folder.
 
-    Raises LogError, naming file, column, expected and got: file missing, truncated or corrupt;
-    column or axis missing; NaN or inf; unequal lengths; time that does not increase; gaps or
-    jitter beyond 1 % of a sample; a declared rate that the stamps contradict; less than one
-    second; another number of axes than `n_axes`; more declared than `max_bytes`.
+    `columns` is a column map, the path of one, or the name of a shipped one (`ur-rtde`, `franka`, ...).
+    None is for files with the native column names of `axisight.case/1`, for ROS recordings and for LeRobot
+    folders. `robot` is the robot that was logged. Its joint names give the order of the axes in recordings,
+    its gear ratios convert joint-side signals to the motor side, and its torque constants (Nm/A) convert
+    currents without a scale.
+    `n_axes` is the expected number of driven axes, by default that of the robot.
+    `max_bytes` limits the bytes of the mapped columns, counted as read and again as signals; the default is
+    64 MiB plus sixteen times the size of the files. Columns that are not mapped are not read.
+    `currents` accepts currents with an unknown torque constant (scale "unknown"), which a diagnosis finds.
+
+    Raises LogError, naming file, column, what was expected and what came, for:
+
+    - a file that is missing, truncated or corrupt, or declares more than `max_bytes`;
+    - a missing column or axis, or another number of axes than `n_axes`;
+    - NaN or inf, and signals of unequal lengths;
+    - time that does not increase, gaps, and jitter beyond 1 % of a sample;
+    - a declared rate that the stamps contradict, and logs shorter than 1 s;
+    - joint-side signals or currents without the robot that they need.
+
+    Raises MissingExtraError if a library for the format is not installed, and InputError for a `max_bytes`
+    that is not a whole number from 1.
     """
     return log_of(
         gather(path, columns, robot, max_bytes), n_axes=n_axes, robot=robot, currents=currents
@@ -61,7 +69,7 @@ def log_of(
     robot: Robot | None = None,
     currents: bool = False,
 ) -> Log:
-    """Return the log of gathered signals; options and what is raised as in `read_log`."""
+    """Return the log of gathered signals; options and errors are those of `read_log`."""
     if found.columns.side == "joint" and robot is None:
         raise LogError(
             f"{found.path}: side: expected a robot, whose gear ratios turn signals of joints into those of "
@@ -78,7 +86,7 @@ def log_of(
 
 
 def _check_currents(found: Gathered, robot: Robot | None, *, taken: bool) -> None:
-    """Raise LogError for currents that nothing turns into torques; ``taken``: but for those of unknown constants."""
+    """Raise LogError for currents that nothing converts to torques; ``taken`` allows unknown constants."""
     stated = found.currents - found.unknown.keys()
     if stated and robot is None:
         raise LogError(
@@ -93,10 +101,10 @@ def _check_currents(found: Gathered, robot: Robot | None, *, taken: bool) -> Non
 
 
 def grid_of(found: Gathered) -> Grid:
-    """Return the time grid of gathered signals, with findings."""
+    """Return the time grid of gathered signals, with its findings."""
     time = found.columns.time
     resample = time.resample_hz if time is not None else None
-    assert resample != "mean"  # gathering has put the number
+    assert resample != "mean"  # `gather` has replaced it by the rate
     n_samples = max((values.size for values in found.signals.values()), default=0)
     return make_grid(
         found.time_s,
@@ -110,7 +118,7 @@ def grid_of(found: Gathered) -> Grid:
 
 
 def _assemble(found: Gathered, grid: Grid) -> Log:
-    assert grid.sample_time_s is not None  # make_grid without errors always knows it
+    assert grid.sample_time_s is not None  # make_grid sets it unless it reports an error
     time_s: Floats = grid.sample_time_s * np.arange(grid.n_samples, dtype=np.float64)
 
     def matrix(field: str) -> Floats | None:
@@ -125,7 +133,7 @@ def _assemble(found: Gathered, grid: Grid) -> Log:
     position, torque = matrix("position"), matrix("torque")
     assert position is not None
     return Log(
-        # What stands after a dot in the name of a folder is no suffix.
+        # A folder name has no suffix, even if it contains a dot.
         name=found.path.name if is_lerobot(found.path) else found.path.stem,
         sample_time_s=grid.sample_time_s,
         time_s=time_s,
@@ -146,7 +154,7 @@ def _assemble(found: Gathered, grid: Grid) -> Log:
 
 
 def _nominal(found: Gathered) -> tuple[float | None, ...]:
-    """Return what `Log.nominal_nm_a` says."""
+    """Return the value of `Log.nominal_nm_a`."""
     axes = range(len(found.columns.axis))
     return tuple(map(found.unknown.get, axes)) if found.unknown else ()
 

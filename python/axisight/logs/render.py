@@ -1,4 +1,4 @@
-"""Showing a log report in the terminal."""
+"""Show a log report in the terminal."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def render(report: LogReport) -> RenderableType:
     return Group(table, Text(summary, style=_STYLES["ok" if report.ok else "error"]))
 
 
-# Of a terminal of 80 columns, what is left for a name beside what was found.
+# Characters left for a name beside the finding, in a terminal of 80 columns.
 _NAME = 24
 
 
 def _folded(name: str) -> str:
-    """Return a name on lines of so many characters where it has a dot or underscore to end one at."""
+    """Return a name broken into lines after dots or underscores, to fit the column of names."""
     lines = [""]
     for part in re.findall(r"[^._]*[._]|[^._]+", name):
         if lines[-1] and len(lines[-1]) + len(part) > _NAME:

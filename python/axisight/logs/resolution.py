@@ -1,4 +1,4 @@
-"""The steps that the numbers of a channel are made of where they jump: an encoder's, or of few digits."""
+"""Estimate the resolution of a channel around its jumps: encoder steps, or numbers with few digits."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from axisight.logs.log import Floats
 
 Ints = NDArray[np.int64]
 
-# A jump is compared with the smallest changes of speed so many samples around it.
+# Samples on either side of a jump whose smallest changes of speed give the resolution.
 _AROUND = 50
 _SMALLEST = 0.1
 ROUNDING = 1e-12
-"""Differences this small against the values are rounding."""
-# Significant digits that files have when they were written with few; more resolve any motion.
+"""Differences below this share of the largest value are rounding errors."""
+# Numbers of significant digits that count as few; more digits resolve any motion.
 _DIGITS = range(3, 9)
 
 
 def steps_around(values: Floats, places: Ints) -> Floats:
-    """Return the resolution of a position (n,) between samples `k` and `k + 1`, for `k` in `places`.
+    """Return the resolution of a position (n,) between samples `k` and `k + 1`, for each `k` in `places`.
 
-    A position on a grid, of an encoder say, changes its speed by no less than a step of it. Numbers
-    written with few digits have steps that grow tenfold at every power of ten. Zero where neither
-    shows.
+    If an encoder quantizes a position, its step per sample changes by at least one encoder step. Numbers
+    written with few digits have steps that grow tenfold at every power of ten. The result is 0 if neither
+    is visible.
     """
     if not places.size:
         return np.zeros(0)
@@ -35,9 +35,9 @@ def steps_around(values: Floats, places: Ints) -> Floats:
 
 
 def _grid_step(change: Floats, k: int, rounding: float, usual: float) -> float:
-    """Return the smallest changes of speed beside a jump, those of the side where they are larger.
+    """Return the smallest change of speed beside a jump, on the side where it is larger.
 
-    `usual`: those of the whole channel, where the axis rests on both sides.
+    If the axis rests on both sides, the result is `usual`, that of the whole channel.
     """
     before, after = change[max(0, k - 1 - _AROUND) : max(0, k - 1)], change[k + 1 : k + 1 + _AROUND]
     return max(_smallest(before, rounding), _smallest(after, rounding)) or usual
@@ -49,7 +49,7 @@ def _smallest(change: Floats, rounding: float) -> float:
 
 
 def _last_digit(values: Floats, places: Ints) -> Floats:
-    """Return what one in the last digit is at `places`, zero for numbers of many digits."""
+    """Return the value of one unit in the last digit at each of `places`; 0 for numbers with many digits."""
     size = np.abs(values[values != 0.0])
     exponent = np.floor(np.log10(size))
     for digits in _DIGITS:

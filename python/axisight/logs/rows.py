@@ -1,4 +1,4 @@
-"""What is wrong with the rows of a log, whatever machine they are of."""
+"""Check the rows of a log, independently of the machine."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from axisight.logs.log import Floats
 def check_rows(
     signals: Mapping[Channel, Floats], labels: Mapping[Channel, str], sample_time_s: float
 ) -> list[Finding]:
-    """Return findings about rows frozen, given twice, missing, out of order, and single wrong samples.
+    """Return findings about frozen, repeated, missing and shuffled rows and about single wrong samples.
 
     `signals` are finite and (n,) each, by field (`position`, `torque`, `velocity`, ...) and axis
-    from 0; `labels` name their columns. References are not judged: they may be anything.
+    from 0; `labels` name their columns. References are not checked, because they may take any form.
     """
     return [
         *check_frozen(signals, labels, sample_time_s),

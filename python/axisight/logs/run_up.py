@@ -1,4 +1,4 @@
-"""How a simulation comes from rest into the motion that a log begins with."""
+"""The run-up: a simulated motion from rest into the motion at the first sample of a log."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ Floats = NDArray[np.float64]
 @summarized
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunUp:
-    """Samples before a log, which are simulated and not compared; the first is at rest.
+    """Samples before a log that are simulated but not compared; the first is at rest.
 
-    Motor-side `position_rad` (m, axes) (rad), `torque_nm` (Nm) and `velocity_ref_rad_s` (rad/s), at the
-    sample time of the log; the sample behind the last is the first of the log. Raises InputError when
-    shapes disagree.
+    Motor-side `position_rad` (rad), `torque_nm` (Nm) and `velocity_ref_rad_s` (rad/s) have shape (m, axes),
+    at the sample time of the log. The sample after the last one is the first of the log. Raises InputError
+    when shapes disagree.
     """
 
     position_rad: Floats
@@ -43,7 +43,10 @@ class RunUp:
         return int(self.position_rad.shape[0])
 
     def less(self, position_rad: Floats, torque_nm: Floats) -> RunUp:
-        """Return the same with so much (axes,) taken off where the log begins, and smoothly less before."""
+        """Return the run-up minus an offset that eases from 0 to these values at the start of the log.
+
+        `position_rad` (rad) and `torque_nm` (Nm) have shape (axes,).
+        """
         share = eased(np.linspace(0.0, 1.0, self.n_samples + 1)[:-1])[:, None]
         return RunUp(
             position_rad=self.position_rad - share * position_rad,
@@ -53,5 +56,5 @@ class RunUp:
 
 
 def eased(share: Floats) -> Floats:
-    """Return a share from 0 to 1 with its first two rates zero at both ends."""
+    """Return a smooth step of a share from 0 to 1: its first two derivatives are zero at both ends."""
     return np.asarray(share**3 * (10 - 15 * share + 6 * share**2))

@@ -1,4 +1,4 @@
-"""Opening a file of any format as named arrays, whatever they mean."""
+"""Open a file of any format as named arrays, without regard to their meaning."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 def is_folder_log(path: Path) -> bool:
-    """Whether a path is a log though it may be no file: a recording of ROS, an episode of LeRobot."""
+    """Whether a path is a log that may be a folder: a recording, or an episode of LeRobot."""
     return is_bag(path) or is_lerobot(path)
 
 
@@ -44,13 +44,13 @@ def files_of(path: Path) -> list[Path]:
 def load_arrays(
     path: Path, csv: CsvOptions | None = None, budget: Budget | None = None
 ) -> LazyArrays:
-    """Return the arrays of a file by (dotted) name, read as they are asked for; scalars are 0-dimensional.
+    """Return the arrays of a file by (dotted) name, each read at the first access; scalars are 0-dimensional.
 
     The suffix chooses the format: .parquet, .csv, .mat (v5 or v7.3), .h5, .hdf5, .npz, or a recording
-    (.mcap, .bag, .db3, or the folder of a rosbag2). A folder of LeRobot is another log, of one
-    episode (`folder#3`). What the file declares counts against `budget`, by default one by its size.
-    Raises MissingExtraError for one without the library that reads it, LogError for a missing file, an
-    unknown suffix, an episode that is not there, a truncated or corrupt file, and one that is too large.
+    (.mcap, .bag, .db3, or the folder of a rosbag2). A LeRobot folder is read by episode (`folder#3`).
+    Declared sizes count against `budget`; the default budget follows from the size of the file.
+    Raises LogError for a missing file, an unknown suffix, a missing episode, a truncated or corrupt file, and
+    a file that is too large. Raises MissingExtraError if the library for the format is not installed.
     """
     budget = Budget() if budget is None else budget
     usable_path(path, LogError)

@@ -1,4 +1,4 @@
-"""Recordings as named arrays: rosbag2 (SQLite, MCAP), ROS 1 bags, MCAP files alone, of ROS or not."""
+"""Read recordings as named arrays: rosbag2 (SQLite, MCAP), ROS 1 bags, and MCAP files with or without ROS."""
 
 from __future__ import annotations
 
@@ -14,24 +14,26 @@ from axisight.logs.messages import Topics
 from axisight.logs.sources_mcap import is_of_ros, read_mcap
 
 BAG_SUFFIXES = (".mcap", ".bag", ".db3")
-"""How files end that `load_bag` reads; a rosbag2 is a folder with ``metadata.yaml`` too."""
+"""Suffixes of files that `load_bag` reads; a folder with ``metadata.yaml`` is a recording too."""
 
 _MOST_SAID = 8
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path is a recording, by its name or as the folder of one of ROS."""
+    """Whether a path is a recording: by its suffix, or as a folder with ``metadata.yaml``."""
     return path.suffix.lower() in BAG_SUFFIXES or (path / "metadata.yaml").is_file()
 
 
 def load_bag(path: Path, budget: Budget | None = None) -> LazyArrays:
     """Return the numbers of every topic of a recording by ``topic.field``, or ``topic.field.joint``.
 
-    ``topic.time_s`` are the stamps of its messages, those of recording where they have none, from the
-    first on. Messages of one topic that name other joints become ``topic#2``. Topics whose messages have no
-    numbers are left out, and those of a type that nobody defines or of an encoding that is not read,
-    which the doubts say. Numbers count against ``budget`` as messages come. Raises LogError and
-    MissingExtraError.
+    ``topic.time_s`` is the time (s) since the first message, from the stamps of the messages, or from the
+    time of recording if they have none. Messages of one topic that name other joints become ``topic#2``.
+    Topics without numbers are left out. Topics of an undefined type or an unsupported encoding are left out
+    as well, and the doubts say so. Numbers count against ``budget``.
+
+    Raises LogError if no topic has numbers or the budget is spent, MissingExtraError if the library for the
+    recording is not installed.
     """
     budget = _own_budget(path) if budget is None else budget
     topics = Topics(budget)
@@ -62,7 +64,7 @@ def _own_budget(path: Path) -> Budget:
 
 
 def _read_ros(path: Path, topics: Topics) -> dict[str, list[str]]:
-    """Read all messages, and return the topics that were left out by the reason."""
+    """Add all messages to ``topics`` and return the topics left out, by reason."""
     any_reader, stores = _rosbags()
     unknown: set[str] = set()
     left_out: dict[str, list[str]] = {}
@@ -89,5 +91,5 @@ def _rosbags() -> tuple[Any, Any]:
         raise MissingExtraError(
             "recordings of ROS are read by rosbags: pip install 'axisight[ros]'"
         ) from error
-    # Recordings before ROS 2 Iron hold no definitions of their types.
+    # Recordings before ROS 2 Iron do not contain the definitions of their types.
     return reader, types.get_typestore(types.Stores.ROS2_HUMBLE)

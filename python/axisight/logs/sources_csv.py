@@ -23,12 +23,12 @@ UNENDED = "expected a line end behind the last row, as behind the others, got no
 
 
 def load_csv(path: Path, budget: Budget, options: CsvOptions, *, exact: bool = False) -> LazyArrays:
-    """Return the columns of a table; of names that stand twice none is read.
+    """Return the columns of a CSV file by name; columns that share a name cannot be read.
 
-    ``exact``: numbers to the last bit, which takes longer.
+    ``exact``: parse numbers to the last bit, which takes longer.
 
-    A last line without an end is said among the doubts: whether the file was cut inside its last number
-    cannot be known from it. Raises LogError for a table that is too wide or too large.
+    A last line without a line end becomes a doubt, because the file may be cut inside its last number.
+    Raises LogError for a table that is too wide or too large, or whose rows are longer than its header.
     """
     lines, ended = _lines(path)
     with path.open(encoding="utf-8", newline="") as file:
@@ -57,7 +57,7 @@ def load_csv(path: Path, budget: Budget, options: CsvOptions, *, exact: bool = F
 
 def _whole(file: TextIO, separator: str, options: CsvOptions, exact: bool) -> pd.DataFrame:
     with warnings.catch_warnings():
-        # Of rows that are all, or from the first on, longer than the header pandas drops the end.
+        # pandas silently drops the end of rows that are longer than the header.
         warnings.filterwarnings("error", "Length of header", pd.errors.ParserWarning)
         try:
             return pd.read_csv(
@@ -81,7 +81,7 @@ def _column(frame: pd.DataFrame, k: int) -> NDArray[Any]:
 
 
 def _settle(file: TextIO, options: CsvOptions) -> str:
-    """Go behind the lines to be skipped, and return what stands between the names of the header."""
+    """Move the file past the lines to skip, and return the separator."""
     for _ in range(options.skip_rows):
         if not file.readline():
             break
@@ -94,7 +94,7 @@ def _settle(file: TextIO, options: CsvOptions) -> str:
 
 
 def _lines(path: Path) -> tuple[int, bool]:
-    """Return at most how many lines a file has, and whether the last one is ended where others are."""
+    """Return an upper bound on the number of lines, and whether the last line ends as the others do."""
     count, last = 0, b""
     with path.open("rb") as file:
         while block := file.read(_BLOCK):

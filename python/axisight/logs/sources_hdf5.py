@@ -21,8 +21,8 @@ _DEEPEST = 32
 def load_hdf5(path: Path, budget: Budget, *, matlab: bool = False) -> dict[str, Reader]:
     """Return a reader for every dataset, by its path with dots for slashes.
 
-    With `matlab`, arrays are transposed back to MATLAB's order, singleton dimensions dropped, and
-    cells followed into object arrays. Raises whatever h5py raises on a damaged file.
+    With `matlab`, arrays are transposed back to MATLAB's order, singleton dimensions are dropped, and
+    cells become object arrays. Raises whatever h5py raises on a damaged file.
     """
     with h5py.File(path, "r") as file:
         names = [name for name in _datasets(file) if not name.startswith("#")]
@@ -30,17 +30,17 @@ def load_hdf5(path: Path, budget: Budget, *, matlab: bool = False) -> dict[str, 
 
 
 def _datasets(file: h5py.File) -> list[str]:
-    """Return the paths of all datasets that hard links lead to, each once."""
+    """Return the sorted paths of all datasets that hard links lead to, each dataset once."""
     items = ((path, item) for path, _, item in walk(file))
     return sorted(path for path, item in items if isinstance(item, h5py.Dataset))
 
 
 def walk(file: h5py.File) -> Iterator[tuple[str, Any, Any]]:
-    """Yield path, link and object of every link below the root; None as the object of links that are not hard.
+    """Yield (path, link, object) for every link below the root; the object is None unless the link is hard.
 
-    An object comes once. By links alone, in the order of the file: the library's own visit asks a damaged group
-    for its size and its links for their order, and may never end. Raises what h5py raises on a damaged
-    file, LogError where links of a group repeat.
+    Each object comes once. The library's own visit asks a group for its size and its links for their order,
+    and may therefore never end on a damaged file; this function does not ask for either. Raises what h5py
+    raises on a damaged file, and LogError if links of a group repeat.
     """
     seen: set[int] = set()
     groups = [("", file["/"])]
@@ -62,7 +62,7 @@ def walk(file: h5py.File) -> Iterator[tuple[str, Any, Any]]:
 
 
 def _links(group: h5py.Group) -> list[bytes]:
-    """Return the names of the links of a group; raises LogError where they repeat, as those of a ring do."""
+    """Return the names of the links of a group; raise LogError if they repeat, as in an endless ring."""
     names: set[bytes] = set()
 
     def more(name: bytes) -> bool | None:
@@ -87,19 +87,19 @@ def _reader(path: Path, name: str, budget: Budget, matlab: bool) -> Reader:
 
 
 def _read(dataset: h5py.Dataset, budget: Budget) -> NDArray[Any]:
-    """Return the values of a dataset that holds them itself, as much as it declares within the budget."""
+    """Return the values of a dataset within the budget; raise LogError if other files hold them."""
     if dataset.is_virtual or dataset.external:
         raise LogError("expected values in the file itself, got those of other files")
     if dataset.dtype.hasobject and h5py.check_ref_dtype(dataset.dtype) is not h5py.Reference:
         raise LogError("expected numbers, got values of variable length")
-    # A chunk is unpacked whole, however little of it is asked for.
+    # Reading any part of a chunk unpacks the whole chunk.
     shape = max(dataset.shape or (), dataset.chunks or (), key=prod)
     budget.take_values(shape, dataset.dtype.itemsize)
     return np.asarray(dataset[()])
 
 
 class _Cells:
-    """Cells of MATLAB: references to datasets, each of which is read once however often it is named."""
+    """A reader of MATLAB cells, which are references to datasets; it reads each dataset once."""
 
     def __init__(self, file: h5py.File, budget: Budget) -> None:
         self._file = file
@@ -107,7 +107,7 @@ class _Cells:
         self._seen: dict[str, NDArray[Any]] = {}
 
     def of(self, dataset: h5py.Dataset, depth: int) -> NDArray[Any]:
-        """Return the values of a dataset, cells followed."""
+        """Return the values of a dataset; cells become object arrays."""
         if depth > _DEEPEST:
             raise LogError(f"expected at most {_DEEPEST} cells inside each other")
         if dataset.name in self._seen:

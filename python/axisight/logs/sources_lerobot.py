@@ -1,4 +1,4 @@
-"""Folders of LeRobot, versions 2 and 3: episodes in Parquet files under ``data``, ``meta/info.json`` beside."""
+"""Read LeRobot folders, versions 2 and 3: ``meta/info.json`` and Parquet files with episodes in ``data``."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _EPISODE = "episode_index"
 
 
 class _Info(BaseModel):
-    """What is used of ``meta/info.json``; the rest is about videos and tasks."""
+    """The part of ``meta/info.json`` that is used; the rest is about videos and tasks."""
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 
@@ -28,7 +28,7 @@ class _Info(BaseModel):
 
 
 def split_episode(path: Path) -> tuple[Path, int | None]:
-    """Return the folder and the episode of ``folder#3``; None without a choice."""
+    """Return the folder and the episode of ``folder#3``; the episode is None if the path has none."""
     head, mark, number = path.name.rpartition("#")
     if mark and head and number.isdecimal() and not path.exists():
         return path.with_name(head), int(number)
@@ -36,21 +36,21 @@ def split_episode(path: Path) -> tuple[Path, int | None]:
 
 
 def is_lerobot(path: Path) -> bool:
-    """Whether a path is a folder of LeRobot, with an episode after ``#`` or without."""
+    """Whether a path is a LeRobot folder, with or without an episode after ``#``."""
     return (split_episode(path)[0] / _INFO).is_file()
 
 
 def files_of_episode(path: Path) -> list[Path]:
-    """Return the files that may hold the episode of a path, with the description of the folder."""
+    """Return ``meta/info.json`` and the files that may hold the episode of a path."""
     folder, episode = split_episode(path)
     found = sorted((folder / "data").rglob("*.parquet"))
-    # Version 2 has a file for each; in version 3 many share one.
+    # Version 2 has one file per episode; in version 3 episodes share files.
     own = [file for file in found if file.stem == f"episode_{episode or 0:06d}"]
     return [folder / _INFO, *(own or found)]
 
 
 def check_episode(path: Path) -> None:
-    """Raise LogError, naming the folder, for several episodes without a choice, or one that is not there."""
+    """Raise LogError, naming the folder, if the episode is missing or several exist and none is chosen."""
     folder, episode = split_episode(path)
     total = _info(folder / _INFO).total_episodes
     if total == 0:
@@ -69,8 +69,8 @@ def check_episode(path: Path) -> None:
 def load_lerobot(path: Path, budget: Budget) -> dict[str, Reader]:
     """Return readers of the columns of one episode; `observation.state` becomes `observation.state[0]`, ...
 
-    The folder may be given alone where it has a single episode. Raises LogError for an episode without
-    rows, and whatever the reader raises on a damaged file.
+    Without a choice in the path, this is episode 0. Raises LogError for an episode without rows, and
+    whatever the Parquet reader raises on a damaged file.
     """
     number = split_episode(path)[1] or 0
     filters = [(_EPISODE, "=", number)]

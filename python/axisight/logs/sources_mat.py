@@ -1,4 +1,4 @@
-"""MATLAB files of either kind."""
+"""Read MAT files: version 5, or 7.3, which is HDF5."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""MAT files of version 5, read by their tags: each is held against the bytes that are there before use.
+"""Read MAT files of version 5, checking every tag against the bytes in the file before use.
 
-A file is a row of elements, each a tag (type, size) and its bytes. Variables are elements of type
-miMATRIX, or miCOMPRESSED with one inside: flags, dimensions and name, then numbers, or the matrices that
-a cell or struct is made of. Nothing is trusted: types other than those that must stand somewhere, sizes
-beyond what is around them, and counts that the bytes do not bear out raise LogError.
+A file is a sequence of elements, each a tag (type, size) and its bytes. A variable is an element of type
+miMATRIX, or of type miCOMPRESSED with a miMATRIX inside. It has flags, dimensions and a name, then its
+numbers, or the matrices of a cell or struct. Nothing is trusted: unexpected types, sizes beyond the
+enclosing element, and counts that disagree with the bytes raise LogError.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from axisight.logs.lazy import Reader, given, refusing
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15
 _INT8, _INT32, _UINT32 = (1,), (5,), (6,)
-# Some writers put these where MATLAB has the types above.
+# Some writers use other types than MATLAB for names and dimensions.
 _NAME, _DIMENSIONS = (1, 16), (5, 6)
 _NUMBERS = {
     **{1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4"},
@@ -40,15 +40,15 @@ _OTHERS = {5: "a sparse matrix", 16: "a function handle", 17: "an object of a cl
 _OPAQUE = 17
 _DEEPEST = 32
 _MOST_DIMENSIONS = 32
-# Enough of a compressed variable for flags, dimensions and name.
+# Bytes of a compressed variable that cover flags, dimensions and name.
 _HEAD = 4096
-# What a cell or field costs in memory besides its numbers.
+# Bytes that a cell or field takes in memory besides its numbers.
 _MATRIX_COST = 512
 
 
 @dataclass(frozen=True)
 class _Part:
-    """One element: its type, and where its bytes stand."""
+    """One element: its type, the range of its bytes, and the start of the next element."""
 
     kind: int
     start: int
@@ -58,7 +58,7 @@ class _Part:
 
 @dataclass(frozen=True)
 class _Matrix:
-    """A matrix whose flags, dimensions and name are sound; its content begins at ``body``."""
+    """A matrix with checked flags, dimensions and name; its content begins at byte ``body``."""
 
     data: bytes
     order: str
@@ -77,8 +77,8 @@ class _Matrix:
 def load_mat5(path: Path, budget: Budget) -> dict[str, Reader]:
     """Return a reader for every variable, by dotted name.
 
-    Fields of a struct follow its name after a dot; elements of a struct array by their number from 0
-    (`run.0.q`). Raises LogError for a file whose structure is damaged.
+    Fields of a struct follow its name after a dot; elements of a struct array are numbered from 0
+    (`run.0.q`). Raises LogError for a file with a damaged structure.
     """
     data = path.read_bytes()
     order = _order(data)
@@ -90,7 +90,7 @@ def load_mat5(path: Path, budget: Budget) -> dict[str, Reader]:
                 f"byte {part.start}: expected a variable, got an element of type {part.kind}"
             )
         head = _head(data, part, order)
-        if not head.name:  # what MATLAB keeps for itself
+        if not head.name:  # internal data of MATLAB
             continue
         if head.name in names:
             raise LogError(f"{short(head.name)}: expected one variable of that name, got two")
@@ -98,7 +98,7 @@ def load_mat5(path: Path, budget: Budget) -> dict[str, Reader]:
         if head.kind in (_CELL, _STRUCT, _OBJECT):
             try:
                 matrix = _whole(data, part, order, budget)
-            except LogError as error:  # too large, or damaged: that of who asks for it
+            except LogError as error:  # too large or damaged, which matters only if a map needs it
                 readers[head.name] = refusing(str(error))
                 continue
             readers |= dict(_leaves(head.name, matrix, budget, 0))
@@ -115,7 +115,7 @@ def _later(data: bytes, part: _Part, order: str, budget: Budget) -> Reader:
 
 
 def _order(data: bytes) -> str:
-    """Return the byte order that the header states."""
+    """Return the byte order that the header states; raise LogError for another format."""
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128], "")
     version = unpack_from(f"{order}H", data, 124)[0] >> 8 if order else 0
     if version != 1:
@@ -127,11 +127,11 @@ def _order(data: bytes) -> str:
 
 
 def _part(data: bytes, at: int, end: int, order: str) -> _Part:
-    """Return the element whose tag stands at ``at``; it ends before ``end``."""
+    """Return the element whose tag begins at ``at``; raise LogError unless it ends by ``end``."""
     if at + 8 > end:
         raise LogError(f"byte {at}: expected an element, got the end of what holds it (truncated)")
     kind, size = unpack_from(f"{order}II", data, at)
-    if kind >> 16:  # up to four bytes stand inside the tag
+    if kind >> 16:  # small format: the tag itself holds up to four bytes
         kind, size = kind & 0xFFFF, kind >> 16
         if size > 4:
             raise LogError(f"byte {at}: expected at most 4 bytes in a tag, got {size}")
@@ -141,7 +141,7 @@ def _part(data: bytes, at: int, end: int, order: str) -> _Part:
         raise LogError(
             f"byte {at}: expected at most {end - start} bytes, got an element of {size} (truncated, corrupt)"
         )
-    # Compressed elements alone are not filled up to multiples of 8; the last of a file may not be either.
+    # Elements are padded to multiples of 8 bytes, except compressed ones and perhaps the last of a file.
     after = stop if kind == _COMPRESSED else min(stop + -size % 8, end)
     return _Part(kind, start, stop, after)
 
@@ -162,22 +162,23 @@ def _expect(data: bytes, at: int, end: int, order: str, kinds: tuple[int, ...], 
 
 
 def _head(data: bytes, part: _Part, order: str) -> _Matrix:
-    """Return the head of a variable, of a compressed one without inflating the rest."""
+    """Return the head of a variable; inflate no more than the head of a compressed one."""
     if part.kind == _MATRIX:
         return _matrix(data, part.start, part.stop, order)
     head = _inflate(data, part, _HEAD)
     _declared(head, order)
-    # What follows may be cut: only flags, dimensions and name are looked at.
+    # Here the content may be cut off: callers use only flags, dimensions and name.
     return _matrix(head, 8, len(head), order)
 
 
 def _whole(data: bytes, part: _Part, order: str, budget: Budget) -> _Matrix:
-    """Return a variable, inflated as far as it declares and no further."""
+    """Return a variable; inflate no more than its declared size."""
     if part.kind == _MATRIX:
         return _matrix(data, part.start, part.stop, order)
     size = _declared(_inflate(data, part, 8), order)
     budget.take(size)
-    inflated = _inflate(data, part, size + 9)  # one more, for the checksum behind the last
+    # One byte more than declared, so that zlib reaches the end and verifies the checksum.
+    inflated = _inflate(data, part, size + 9)
     if len(inflated) != size + 8:
         raise LogError(
             f"byte {part.start}: expected {size} bytes compressed here, got {len(inflated) - 8}"
@@ -186,7 +187,7 @@ def _whole(data: bytes, part: _Part, order: str, budget: Budget) -> _Matrix:
 
 
 def _inflate(data: bytes, part: _Part, most: int) -> bytes:
-    """Return the first ``most`` bytes of a compressed element; less is all of it, whose checksum holds."""
+    """Return up to ``most`` bytes of a compressed element; fewer are the whole element, checksum verified."""
     stream = zlib.decompressobj()
     try:
         found = stream.decompress(data[part.start : part.stop], most)
@@ -202,7 +203,7 @@ def _inflate(data: bytes, part: _Part, most: int) -> bytes:
 
 
 def _declared(inflated: bytes, order: str) -> int:
-    """Return the size of the matrix that compressed bytes begin with."""
+    """Return the declared size of the matrix at the start of inflated bytes."""
     if len(inflated) < 8:
         raise LogError("expected a compressed variable, got the end of it")
     kind, size = unpack_from(f"{order}II", inflated)
@@ -212,7 +213,7 @@ def _declared(inflated: bytes, order: str) -> int:
 
 
 def _matrix(data: bytes, at: int, end: int, order: str) -> _Matrix:
-    """Return the matrix whose content stands from ``at`` to ``end``, its head checked."""
+    """Return the matrix with its content from ``at`` to ``end``; raise LogError for a wrong head."""
     flags = _expect(data, at, end, order, _UINT32, "flags")
     if flags.stop - flags.start != 8:
         raise LogError(f"byte {at}: flags: expected 8 bytes, got {flags.stop - flags.start}")
@@ -220,7 +221,7 @@ def _matrix(data: bytes, at: int, end: int, order: str) -> _Matrix:
     kind = word & 0xFF
     if kind not in (_CELL, _STRUCT, _OBJECT, _CHAR, *_NUMERIC, *_OTHERS):
         raise LogError(f"byte {flags.start}: expected a class of arrays, got {kind}")
-    if kind == _OPAQUE:  # has a name and no dimensions
+    if kind == _OPAQUE:  # such an object has a name but no dimensions
         name = _expect(data, flags.next, end, order, _NAME, "name")
         text = data[name.start : name.stop].decode("latin-1")
         return _Matrix(data, order, kind, word, (), text, name.next, end)
@@ -237,7 +238,7 @@ def _matrix(data: bytes, at: int, end: int, order: str) -> _Matrix:
 
 
 def _children(matrix: _Matrix, at: int, count: int, budget: Budget) -> list[_Matrix | None]:
-    """Return the matrices inside a cell or struct, None for empty ones; they fill it exactly."""
+    """Return the matrices in a cell or struct, None for empty ones; raise LogError unless they fill it."""
     if count * 8 > matrix.stop - at:
         raise LogError(f"byte {at}: expected at most {(matrix.stop - at) // 8} cells, got {count}")
     budget.take(count * _MATRIX_COST)
@@ -259,7 +260,7 @@ def _end(matrix: _Matrix, at: int) -> None:
 
 
 def _fields(matrix: _Matrix) -> tuple[list[str], int]:
-    """Return the names of the fields of a struct, and where their values begin."""
+    """Return the field names of a struct, and the byte at which the values begin."""
     at = matrix.body
     if matrix.kind == _OBJECT:
         at = _expect(matrix.data, at, matrix.stop, matrix.order, _INT8, "class").next
@@ -283,7 +284,7 @@ def _fields(matrix: _Matrix) -> tuple[list[str], int]:
 def _leaves(
     label: str, matrix: _Matrix, budget: Budget, depth: int
 ) -> Iterator[tuple[str, Reader]]:
-    """Yield what a variable consists of, structs taken apart, with its dotted name."""
+    """Yield dotted name and reader of every array in a variable; structs are taken apart."""
     if depth > _DEEPEST:
         raise LogError(f"{short(label)}: expected at most {_DEEPEST} structs inside each other")
     if matrix.kind in (_STRUCT, _OBJECT):
@@ -318,7 +319,7 @@ def _of_child(
 
 
 def _numbered(matrix: _Matrix) -> list[tuple[int, int]]:
-    """Return the numbers of elements row by row, with their places in the file, column by column."""
+    """Return (number, place): elements are numbered row by row, the file stores them column by column."""
     places = np.arange(matrix.count).reshape(matrix.dims, order="F")
     return list(enumerate(places.ravel().tolist()))
 
@@ -351,7 +352,7 @@ def _values(matrix: _Matrix, budget: Budget, depth: int) -> NDArray[Any]:
 
 
 def _numbers(matrix: _Matrix, at: int) -> tuple[NDArray[Any], int]:
-    """Return the numbers of one part, as many as the dimensions say, and where it ends."""
+    """Return the numbers at byte ``at`` and the end of their element; raise LogError for a wrong count."""
     part = _part(matrix.data, at, matrix.stop, matrix.order)
     if part.kind not in _NUMBERS:
         raise LogError(f"byte {at}: expected an element of numbers, got type {part.kind}")
@@ -365,7 +366,7 @@ def _numbers(matrix: _Matrix, at: int) -> tuple[NDArray[Any], int]:
 
 
 def _text(matrix: _Matrix) -> NDArray[Any]:
-    """Return characters as one text, or one for each row."""
+    """Return a character matrix as one text per row, 0-dimensional for a single row."""
     if not matrix.count:
         return np.array("")
     part = _part(matrix.data, matrix.body, matrix.stop, matrix.order)

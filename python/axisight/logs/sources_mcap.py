@@ -1,4 +1,4 @@
-"""MCAP files that are not of ROS: messages in JSON, protobuf, or CDR by a definition of ROS 2."""
+"""Read MCAP files not recorded by ROS: messages in JSON, protobuf, or CDR with a definition of ROS 2."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from axisight.logs.cdr import decoder_of_ros2
 from axisight.logs.messages import Topics, said_of
 
 _MAGIC = b"\x89MCAP0\r\n"
-# Magic, kind of the record, its length, length of the profile.
+# Sizes of magic, record kind, record length and profile length.
 _HEAD, _LONGEST_PROFILE = 8 + 1 + 8 + 4, 64
-# A message that is longer is a picture or a cloud of points.
+# A longer message is an image or a point cloud.
 _LONGEST_BYTES = 2**20
 _DEEPEST = 8
 _CDR = "cdr"
@@ -25,7 +25,7 @@ _Decoder = Callable[[bytes], Any]
 
 
 def is_of_ros(path: Path) -> bool:
-    """Whether an MCAP file says that its messages are those of ROS 2, or is none at all."""
+    """Whether a file has the MCAP profile of ROS 2, or is not MCAP, which the reader of ROS then reports."""
     with path.open("rb") as file:
         head = file.read(_HEAD + _LONGEST_PROFILE)
     length = int.from_bytes(head[_HEAD - 4 : _HEAD], "little")
@@ -34,10 +34,10 @@ def is_of_ros(path: Path) -> bool:
 
 
 def read_mcap(path: Path, topics: Topics, budget: Budget) -> dict[str, list[str]]:
-    """Read all messages in JSON, protobuf and CDR, and return the topics that were left out by the reason.
+    """Add all messages in JSON, protobuf and CDR to ``topics``, and return the topics left out, by reason.
 
-    Raises LogError naming topic and time for messages that are not of their encoding, MissingExtraError
-    without the library of one that is there.
+    Raises LogError, naming topic and time, for a message that cannot be decoded or when ``budget`` is spent.
+    Raises MissingExtraError if the library for an encoding in the file is not installed.
     """
     make_reader = _library("mcap.reader", "MCAP files that are not of ROS").make_reader
     decoders: dict[int, _Decoder | str] = {}
@@ -46,7 +46,7 @@ def read_mcap(path: Path, topics: Topics, budget: Budget) -> dict[str, list[str]
         reader = make_reader(file, validate_crcs=True)
         summary = reader.get_summary()
         chunks = summary.chunk_indexes if summary is not None else []
-        # One is there at a time, as long as it says.
+        # One chunk is in memory at a time, with the size that it declares.
         budget.take(max((chunk.uncompressed_size for chunk in chunks), default=0))
         for schema, channel, message in reader.iter_messages():
             if channel.id not in decoders:
@@ -62,7 +62,7 @@ def read_mcap(path: Path, topics: Topics, budget: Budget) -> dict[str, list[str]
                     names.append(channel.topic)
                 continue
             said = said_of(channel.topic, message.log_time)
-            # Those of ROS are read as in its own recordings, which have arrays with names only.
+            # For CDR as in ROS recordings: arrays without names are left out.
             numbered = channel.message_encoding != _CDR
             decoded = _decoded(decode, message.data, said)
             topics.add(channel.topic, message.log_time, decoded, numbered=numbered)
@@ -70,7 +70,7 @@ def read_mcap(path: Path, topics: Topics, budget: Budget) -> dict[str, list[str]
 
 
 def _decoded(decode: _Decoder, data: bytes, said: str) -> Any:
-    """Return a message as dictionaries, lists and numbers."""
+    """Return a decoded message; raise LogError, beginning with ``said``, if that fails."""
     try:
         return decode(data)
     except RecursionError:
@@ -82,7 +82,7 @@ def _decoded(decode: _Decoder, data: bytes, said: str) -> Any:
 
 
 def _decoder(schema: Any, channel: Any) -> _Decoder | str:
-    """Return what decodes the messages of a channel, or why nothing does."""
+    """Return a decoder for the messages of a channel, or the reason why there is none."""
     encoding = channel.message_encoding
     if encoding == "json":
         return _of_json
@@ -95,7 +95,7 @@ def _decoder(schema: Any, channel: Any) -> _Decoder | str:
     )
     try:
         found = library.DecoderFactory().decoder_for(encoding, schema)
-    except Exception as error:  # nor are damaged schemas refused by one kind of error
+    except Exception as error:  # damaged schemas make the library raise nearly anything
         raise LogError(
             f"topic {short(channel.topic)}: expected a schema of protobuf, got one that cannot be used: "
             f"{short(str(error), 120)}"
@@ -106,7 +106,7 @@ def _decoder(schema: Any, channel: Any) -> _Decoder | str:
 
 
 def _of_json(data: bytes) -> Any:
-    """Return a message in JSON; what stands for no number (null in arrays of numbers, too) is NaN."""
+    """Return a message in JSON; null in an array of numbers becomes NaN."""
     return _with_nan(json.loads(data.decode("utf-8")))
 
 
@@ -122,7 +122,7 @@ def _with_nan(value: Any) -> Any:
 
 
 def _plain(message: Any, depth: int = 0) -> Mapping[str, Any]:
-    """Return a message of protobuf as a dictionary, numbers that are not sent as the zeros they mean."""
+    """Return a protobuf message as a dictionary; numbers that were not sent are 0, as protobuf defines."""
     out: dict[str, Any] = {}
     if depth > _DEEPEST:
         return out
@@ -141,7 +141,7 @@ def _plain(message: Any, depth: int = 0) -> Mapping[str, Any]:
 
 
 def _repeated(field: Any) -> bool:
-    """Whether a field holds several values; younger libraries have no labels."""
+    """Whether a field holds several values; newer libraries have `is_repeated` in place of labels."""
     said = getattr(field, "is_repeated", None)
     return bool(field.label == field.LABEL_REPEATED if said is None else said)
 

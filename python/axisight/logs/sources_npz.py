@@ -1,4 +1,4 @@
-"""NPZ files: arrays in a zip archive, each with a header that says how large it is."""
+"""Read NPZ files: arrays in a zip archive, each with a header that declares its size."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _HEADERS = {
 
 
 def load_npz(path: Path, budget: Budget) -> dict[str, Reader]:
-    """Return a reader for every array; raises LogError for two of one name."""
+    """Return a reader for every array, by name; raise LogError for two arrays of one name."""
     with zipfile.ZipFile(path) as archive:
         members = archive.infolist()
     names = [member.filename.removesuffix(".npy") for member in members]

@@ -1,4 +1,4 @@
-"""Parquet files; columns that hold a list per sample become one column for each of its entries."""
+"""Read Parquet files; a column with a list per sample becomes one column per list entry."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from axisight.logs.budget import Budget
 from axisight.logs.lazy import Reader, refusing
 from axisight.logs.parquet_footer import chunks
 
-# Lists with more entries per sample than that hold no signals of axes.
+# A list with more entries per sample than this does not hold signals of axes.
 _MOST_ENTRIES = 4096
 
 
 def load_parquet(path: Path, budget: Budget, filters: Any = None) -> dict[str, Reader]:
-    """Return a reader for every column by name; ``filters``, those of pyarrow, choose rows.
+    """Return a reader for every column, by name; ``filters`` (see pyarrow) select rows.
 
-    A column `q` of lists that are all as long becomes `q[0]`, `q[1]`, ...
+    A column `q` with lists of equal length becomes `q[0]`, `q[1]`, ... Raises LogError for a damaged footer;
+    a reader raises LogError for values that are not numbers and for lists of unequal length.
     """
     with pq.ParquetFile(path) as file:
         metadata, schema = file.metadata, file.schema_arrow
@@ -48,7 +49,7 @@ def load_parquet(path: Path, budget: Budget, filters: Any = None) -> dict[str, R
 
 
 def _leaves(path: Path) -> dict[str, tuple[int, int]]:
-    """Return the number of values and the bytes that every column declares, unpacked."""
+    """Return, by column, the declared number of values and of uncompressed bytes."""
     found: dict[str, tuple[int, int]] = {}
     for chunk in chunks(path):
         for own in {chunk.path, *_column_of(chunk.path)}:
@@ -58,14 +59,14 @@ def _leaves(path: Path) -> dict[str, tuple[int, int]]:
 
 
 def _column_of(path: str) -> Iterator[str]:
-    """Yield the columns that a leaf may belong to: names may have dots themselves."""
+    """Yield all columns that a leaf may belong to, as names of columns may contain dots."""
     while "." in path:
         path = path.rpartition(".")[0]
         yield path
 
 
 def _entries(kind: Any, values: int, rows: int) -> int:
-    """Return the entries per sample of a column of lists that may all be as long; 0 for others."""
+    """Return the entries per sample of a column whose lists may have equal length; 0 for other columns."""
     lists = pa.types.is_list(kind) or pa.types.is_large_list(kind)
     if not (lists or pa.types.is_fixed_size_list(kind)) or not rows:
         return 0
@@ -86,7 +87,7 @@ def _entry(matrix: Any, entries: int, k: int) -> Reader:
 
 
 class _Column:
-    """One column of a file, and what it declares."""
+    """One column of a file, with its declared size."""
 
     def __init__(
         self, path: Path, budget: Budget, filters: Any, field: Any, values: int, size: int
@@ -99,24 +100,24 @@ class _Column:
 
     def _read(self) -> Any:
         self._budget.take(self._declared)
-        # Not pandas.read_parquet: that turns a stored index such as time_s into no column at all
+        # Not pandas.read_parquet, which does not return a stored index such as time_s as a column.
         table = pq.read_table(
             self._path, columns=[self._field.name], filters=self._filters, partitioning=None
         )
         return table.column(self._field.name)
 
     def plain(self) -> NDArray[Any]:
-        """Return a column of one value per sample."""
+        """Return the values (n,) of a column with one value per sample."""
         kind = self._field.type
         numbers = (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean)
         fixed = (pa.types.is_decimal, pa.types.is_temporal, pa.types.is_null)
-        # A text may stand once in the file and in every row: nothing declares what it takes.
+        # Text is refused: many rows may share one stored text, so no declared size bounds the memory.
         if not any(is_kind(kind) for is_kind in (*numbers, *fixed)):
             raise LogError(f"expected numbers, got values of type {kind}")
         return np.asarray(self._read().to_numpy())
 
     def matrix(self) -> NDArray[Any]:
-        """Return a column of lists of numbers that are all as long as (samples, entries)."""
+        """Return a column with lists of equal length as an array (samples, entries)."""
         column = self._read()
         if column.null_count:
             raise LogError(f"expected a list for every sample, got {column.null_count} without one")

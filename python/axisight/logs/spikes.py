@@ -1,4 +1,4 @@
-"""Single samples that leave a signal and come back: bits lost on a bus, glitches of a sensor."""
+"""Find spikes: single wrong samples, from bits lost on a bus or sensor glitches."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from numpy.typing import NDArray
 
 from axisight.logs.log import Floats
 
-# What one wrong sample leaves when every sample is compared with the cubic through its four
-# neighbours. A step, a corner or a pulse of a real motion leaves another pattern (a corner
-# correlates with this one by 0.976).
+# Deviations around one wrong sample, if each sample is compared with the cubic through its four neighbours.
+# A step, a corner or a pulse of a real motion gives another pattern (a corner correlates with it by 0.976).
 _PATTERN = np.array([1 / 6, -2 / 3, 1.0, -2 / 3, 1 / 6])
 _ALIKE = 0.985
-# Gaussian noise reaches neither: 15 standard deviations around it, five times the largest deviation
-# of the log but for five hundredths of a per cent of its samples, or as many as two spikes touch.
+# Gaussian noise reaches neither limit. A spike exceeds 15 standard deviations of its neighbourhood, and five
+# times the largest deviation of the log, where the top 0.05 % of the samples (at least the ten samples that
+# two spikes touch) do not count.
 _LOCAL = 15.0
 _WHOLE = 5.0
 _LARGEST = 0.0005
 _TOUCHED = 10
 _NEIGHBOURS = 101
-# Of the largest steps: what is smaller tells nothing of the motion, and machines do it too.
+# Share of the largest steps below which a spike does no harm; machines make such spikes too.
 _SHARE_OF_STEP = 0.02
-# More than that is how the signal is (a coarse encoder toggles), not an accident.
+# More spikes than this belong to the signal, as of a coarse encoder that toggles.
 _MOST = 20
 
 
 def isolated_spikes(values: Floats) -> NDArray[np.int64]:
-    """Return the indices of single wrong samples of `values` (n,); none if there are many."""
+    """Return the indices of single wrong samples of `values` (n,); empty if there are more than 20."""
     none = np.zeros(0, dtype=np.int64)
     if len(values) < 2 * _NEIGHBOURS:
         return none

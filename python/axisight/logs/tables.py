@@ -1,4 +1,4 @@
-"""Logs out of tables in memory: pandas DataFrames, xarray Datasets, mappings of arrays."""
+"""Make logs from tables in memory: pandas DataFrames, xarray Datasets, mappings of arrays."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ _UNITS = {
     "torque": _TORQUE,
     "temperature": _TEMPERATURE,
 }
-# What a name without a unit means on an axis that turns, and on one that slides.
+# Default unit of a revolute axis -> default unit of a prismatic axis.
 _SLIDING = {"rad": "m", "rad/s": "m/s", "Nm": "N", "degC": "degC"}
 _TIME_UNITS = ("s", "ms", "us", "ns")
 # Units in names that no signal here has. They are recognized so that they can be refused.
@@ -68,13 +68,13 @@ _FOREIGN = {
 }
 _MAP = "a column map (columns=...)"
 _TIMES = re.compile(r"(?:time|t|timestamp)(?:_(s|ms|us|ns))?", re.IGNORECASE)
-# Names that a message lists.
+# A message lists at most this many names.
 _SHOWN = 12
 
 
 @dataclass(frozen=True)
 class _Column:
-    """A named array (n,) or (n, axes), the unit that stands beside it, and what its second axis is labelled."""
+    """A named array (n,) or (n, axes), its stated unit, and the labels of its second dimension."""
 
     name: str
     values: NDArray[Any]
@@ -84,7 +84,7 @@ class _Column:
 
 @dataclass
 class _Found:
-    """Columns of a table by field and axis (from 0), with units; the time column; names of no meaning."""
+    """The recognized columns: (name, unit) by field and axis (from 0) and of the time; other names."""
 
     signals: dict[tuple[str, int], tuple[str, str]]
     arrays: dict[str, NDArray[Any]]
@@ -93,7 +93,7 @@ class _Found:
 
 
 def is_table(value: object) -> bool:
-    """Whether a value is a table in memory: a DataFrame, a Dataset, a mapping, or what turns into a DataFrame."""
+    """Whether a value is a table in memory: a DataFrame, Dataset, mapping, or object with `to_pandas`."""
     return isinstance(value, xr.Dataset | Mapping) or _is_frame(value) or _converts(value)
 
 
@@ -117,11 +117,12 @@ def log_of_table(
         may be a joint name of the robot, and is left out where an array has all axes. A unit may
         follow: `position_deg_1`, `velocity_rpm_1`, `torque_nm_1`, `time_ms`. The attribute `units`
         of a Dataset counts first; without any unit, signals are in rad, rad/s, Nm, degC and s, on
-        sliding axes in m, m/s and N. A unit that the signal cannot have is refused.
-    name : what the log is called.
+        prismatic axes in m, m/s and N. A unit that the signal cannot have is refused.
+    name : name of the log, also in messages.
     robot, currents : as in `read_log`.
 
-    Raises LogError naming the column, what was expected and what came, with the nearest name.
+    The attributes `sample_time_s` (s), `period_s` (s) and `excitation` of the table count if they are set.
+    Raises LogError with the column, what was expected, what came, and the nearest name.
 
     """
     listed, attrs = _columns(table, name), _attributes(table, name)
@@ -137,7 +138,7 @@ def log_of_table(
 
 
 def _is_frame(value: object) -> bool:
-    pandas = sys.modules.get("pandas")  # without it nobody has a DataFrame
+    pandas = sys.modules.get("pandas")  # not imported: then no value is a DataFrame
     return pandas is not None and isinstance(value, pandas.DataFrame)
 
 
@@ -146,7 +147,7 @@ def _converts(value: object) -> bool:
 
 
 def _columns(table: object, name: str) -> list[_Column]:
-    """Return the arrays of a table by name; raises LogError for a name that stands twice."""
+    """Return the arrays of a table with their names; raise LogError for a repeated name."""
     if isinstance(table, xr.Dataset):
         found = list(_of_dataset(table))
     elif isinstance(table, Mapping):
@@ -182,7 +183,7 @@ def _of_frame(frame: Any) -> Iterator[_Column]:
 
 
 def _flat(name: object) -> str:
-    """Return the name of a column; levels of a MultiIndex are joined: `("position", 1)` is `position_1`."""
+    """Return the name of a column, with the levels of a MultiIndex joined: ("position", 1) is position_1."""
     return "_".join(map(str, name)) if isinstance(name, tuple) else str(name)
 
 
@@ -201,7 +202,7 @@ def _of_dataset(table: xr.Dataset) -> Iterator[_Column]:
 
 
 def _found(columns: Sequence[_Column], name: str, robot: Robot | None) -> _Found:
-    """Return what the names of columns mean; raises LogError for two columns of one meaning."""
+    """Return the columns by the meaning of their names; raise LogError for two columns of one meaning."""
     joints = [] if robot is None else robot.axis_names
     found = _Found({}, {}, None, [])
     pattern = _pattern(joints)
@@ -243,10 +244,10 @@ def _found(columns: Sequence[_Column], name: str, robot: Robot | None) -> _Found
 
 
 def _pattern(joints: Sequence[str]) -> re.Pattern[str]:
-    """Return the pattern of names: signal, unit, axis, with the unit before or behind the axis."""
+    """Return the regular expression of column names: signal, axis, and a unit before or after the axis."""
     stems = "|".join(_FIELDS)
     known = {unit for units in (*_UNITS.values(), _FOREIGN) for unit in units}
-    known -= {joint.lower() for joint in joints}  # `torque_a` of a joint called a
+    known -= {joint.lower() for joint in joints}  # `torque_a` means the joint if one is called a
     units = "|".join(sorted(known, key=len, reverse=True))
     axes = "|".join([r"[1-9]\d{0,3}", *(re.escape(joint) for joint in joints)])
     return re.compile(
@@ -258,7 +259,7 @@ def _pattern(joints: Sequence[str]) -> re.Pattern[str]:
 def _by_axis(
     column: _Column, place: str | None, joints: Sequence[str], name: str
 ) -> Iterator[tuple[int, str, NDArray[Any], str]]:
-    """Yield axis (from 0), name, values and units of each signal in a column; raises LogError for a wrong axis."""
+    """Yield axis (from 0), name, values, unit of each signal in a column; raise LogError for a wrong axis."""
     values, units = column.values, column.units.strip()
     if values.ndim > 2:
         raise LogError(
@@ -284,7 +285,7 @@ def _by_axis(
 
 
 def _axis_of(column: str, place: str | None, joints: Sequence[str], name: str) -> int:
-    """Return the axis (from 1) that a name says; the first one without. Raises LogError for no joint."""
+    """Return the axis (from 1) in a name, 1 if it has none; raise LogError for an unknown joint."""
     if place is None:
         return 1
     if place.isdecimal():
@@ -296,7 +297,7 @@ def _axis_of(column: str, place: str | None, joints: Sequence[str], name: str) -
 
 
 def _numbers(column: _Column, n: int, joints: Sequence[str], name: str) -> list[int]:
-    """Return the axes (from 1) of an array's columns; none where the labels are other joints."""
+    """Return the axes (from 1) of an array's columns; [] if a label is not a driven joint."""
     usual = list(range(1, n + 1))
     labels = [str(label) if isinstance(label, str) else label for label in column.axes or usual]
     texts = [label for label in labels if isinstance(label, str)]
@@ -309,13 +310,13 @@ def _numbers(column: _Column, n: int, joints: Sequence[str], name: str) -> list[
         return usual
     if not joints:
         return usual
-    if not set(labels) <= set(joints):  # of all joints, elastic ones too
+    if not set(labels) <= set(joints):  # an array over all joints, elastic ones too
         return []
     return [axis_number(label, joints) for label in labels]
 
 
 def _written(suffix: str) -> str:
-    """Return the unit that a suffix of a name stands for: `rad_s` is rad/s."""
+    """Return the unit for a suffix of a name: `rad_s` is rad/s."""
     meant = {**_FOREIGN, **{key: unit for units in _UNITS.values() for key, unit in units.items()}}
     return meant[suffix.lower()]
 
@@ -339,13 +340,13 @@ def _unit(column: str, given: Sequence[str], field: str, slides: bool | None) ->
 
 
 def _slides(robot: Robot | None, axis: int) -> bool | None:
-    """Return whether an axis (from 0) slides; None where no robot says it."""
+    """Return whether an axis (from 0) is prismatic; None if no robot says so."""
     known = robot is not None and axis < robot.n_axes
     return bool(robot.axis_is_prismatic[axis]) if robot is not None and known else None
 
 
 def _wrong_unit(column: str, known: Sequence[str], unit: str) -> str:
-    """Return what is said of a unit that a column cannot have."""
+    """Return the message for a unit that a column cannot have."""
     return (
         f"{short(column)}: unit: expected one of {', '.join(known)}, got {shown(unit)}; {_MAP} gives "
         f"other units and scales{as_unit(unit)}"
@@ -353,7 +354,7 @@ def _wrong_unit(column: str, known: Sequence[str], unit: str) -> str:
 
 
 def _map_of(found: _Found, name: str, step: float | None, robot: Robot | None) -> ColumnMap:
-    """Return the column map of what was found; raises LogError for what is missing.
+    """Return the column map of the recognized columns; raise LogError for a missing one.
 
     ``step``: sample time (s) for a table without time stamps.
     """
@@ -383,7 +384,7 @@ def _map_of(found: _Found, name: str, step: float | None, robot: Robot | None) -
 
 
 def _attributes(table: object, name: str) -> dict[str, Any]:
-    """Return what the attributes of a table say of the log; raises LogError for a wrong value."""
+    """Return the attributes of a table that describe the log; raise LogError for a wrong value."""
     attrs = getattr(table, "attrs", {})
     checks: dict[str, Callable[[str, object], Any]] = {
         "sample_time_s": positive,
@@ -398,7 +399,7 @@ def _attributes(table: object, name: str) -> dict[str, Any]:
 
 
 def _missing(wanted: str, unit: str, found: _Found, names: Sequence[str]) -> str:
-    """Return what is said of a column that is not there, with the name that was perhaps meant for it."""
+    """Return the message for a missing column, with the name that was perhaps meant."""
     near = nearest(wanted, found.others)
     meant = "" if near is None else f". Did you mean {wanted!r} by {near!r}?"
     listed = ", ".join(map(short, names[:_SHOWN])) or "nothing"

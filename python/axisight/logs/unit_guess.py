@@ -1,4 +1,4 @@
-"""Finding wrong units by comparing a velocity with the differentiated position."""
+"""Find wrong units by comparing a velocity with the differentiated position."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ALIKE = 0.95
 _EXACT = 0.03
 _FASTEST_RAD_S = 3000.0
 
-# velocity column / differentiated position -> what that ratio means
+# Ratio of velocity to differentiated position -> meaning of that ratio
 _MEANINGS = {
     180.0 / math.pi: "velocity in deg/s, position in rad",
     math.pi / 180.0: "velocity in rad/s, position in deg",
@@ -35,8 +35,8 @@ def velocity_ratio(position: Floats, velocity: Floats, sample_time_s: float) -> 
     """Return (ratio, correlation) of `velocity` (n,) to the derivative of `position` (n,).
 
     Both are compared below 20 Hz, or a fifth of the sample rate if that is less. A ratio of 1
-    means equal units. The correlation is 0 when one of the two does not move. Raises InputError
-    like `differentiate`.
+    means equal units. If one of the two does not move, the correlation is 0 and the ratio NaN. Raises
+    InputError like `differentiate`.
     """
     cutoff_hz = min(_BAND_HZ, 0.2 / sample_time_s)
     derived, _ = differentiate(position, sample_time_s, cutoff_hz)

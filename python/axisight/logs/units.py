@@ -1,4 +1,4 @@
-"""Units a column map may name, and their factors to SI."""
+"""The units that a column map may name, and their factors to SI."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TorqueUnit = Literal["Nm", "N", "A", "V"]
 TemperatureUnit = Literal["degC", "K"]
 
 POSITION_UNITS = ("rad", "deg", "rev", "m", "mm")
-"""Units that positions have in names; counts need a scale beside them."""
+"""Units of positions that a name alone can state; counts also need `counts_per_rev`."""
 PRISMATIC_UNITS = frozenset({"m", "mm", "m/s", "mm/s", "N"})
 """Units that only a prismatic axis has."""
 REVOLUTE_UNITS = frozenset(
@@ -63,5 +63,5 @@ def si_factor(unit: str, counts_per_rev: float | None = None) -> float:
 
 
 def si_offset(unit: str) -> float:
-    """Return what is added after scaling: only kelvin to degC needs it."""
+    """Return the offset to add after scaling, -273.15 for K (to degC) and 0 for every other unit."""
     return -273.15 if unit == "K" else 0.0

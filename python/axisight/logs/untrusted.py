@@ -1,4 +1,4 @@
-"""Cases and logs of somebody else: nothing outside their folder is opened, or they are refused."""
+"""Refuse cases and logs from strangers that would open anything outside their folder."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from axisight.logs.sources_hdf5 import walk
 
 
 def check_folder(folder: Path) -> None:
-    """Raise CaseError for a link below a folder that leads out of it, and for what is neither file nor folder."""
+    """Raise CaseError for links that lead out of a folder, and for devices and pipes in it."""
     top = folder.resolve()
     for path in _below(folder):
         target = path.resolve()
@@ -26,7 +26,7 @@ def check_folder(folder: Path) -> None:
         try:
             kind = target.stat().st_mode
         except FileNotFoundError:
-            # A link to nothing opens nothing.
+            # A dangling link cannot open anything.
             continue
         if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
             raise CaseError(f"{path}: expected files and folders only, got a device or a pipe")
@@ -34,16 +34,17 @@ def check_folder(folder: Path) -> None:
 
 def check_name(name: str, said: str) -> None:
     """Raise CaseError, beginning with ``said``, for a name in a case that may lead out of its folder."""
-    # By the rules of both systems: a case is to mean the same on each.
+    # By the rules of POSIX and of Windows, so that a case means the same on both.
     for path in (PurePosixPath(name), PureWindowsPath(name)):
         if path.anchor or ".." in path.parts:
             raise CaseError(f"{said}: expected a path inside the case folder, got {name!r}")
 
 
 def check_log_inside(path: Path) -> None:
-    """Raise LogError for a log that has others opened beside it.
+    """Raise LogError for a log that would open files outside its folder, or an HDF5 file with data in others.
 
-    What a folder of a recording holds stays in it, and an HDF5 file (MATLAB v7.3 too) names no other.
+    Links in the folder of a recording must stay inside, and an HDF5 file (also MATLAB v7.3) must not refer to
+    another file.
     """
     files = files_of(path) if path.exists() or is_folder_log(path) else []
     top = path.parent.resolve()
@@ -57,7 +58,7 @@ def check_log_inside(path: Path) -> None:
 
 
 def _check_hdf5(path: Path) -> None:
-    """Raise LogError for a file with data in others; none of those is opened."""
+    """Raise LogError for an HDF5 file with data in other files, without opening them."""
     try:
         with h5py.File(path, "r") as file:
             found = next(filter(None, (_elsewhere(*one) for one in walk(file))), None)
@@ -68,7 +69,7 @@ def _check_hdf5(path: Path) -> None:
 
 
 def _elsewhere(name: str, link: object, item: object) -> str | None:
-    """Return what is wrong with a link or object whose data is in another file."""
+    """Return the message for a link or object with data in another file; None if its data is here."""
     if isinstance(link, h5py.ExternalLink):
         return f"{name}: expected data in this file, got a link to {link.filename}"
     if not isinstance(item, h5py.Dataset):

@@ -1,4 +1,4 @@
-"""What must hold before signals may become a Log."""
+"""Checks that signals must pass to become a Log."""
 
 from __future__ import annotations
 
@@ -14,7 +14,11 @@ from axisight.logs.log import Floats, Log
 
 
 def check_axes(found: Gathered, n_axes: int | None) -> list[Finding]:
-    """Check the number of axes, that all have a torque, and a reference all of them or none."""
+    """Return findings about the number of axes, and about signals that only some axes have.
+
+    Either all axes must have a torque, or all must have a target of the position. References must exist for
+    all axes or for none.
+    """
     findings = []
     got = len(found.columns.axis)
     if n_axes is not None and got != n_axes:
@@ -34,7 +38,7 @@ def check_axes(found: Gathered, n_axes: int | None) -> list[Finding]:
 
 
 def _no_torque(found: Gathered) -> list[Finding]:
-    """Return a finding where there are no targets of positions either, from which a command follows."""
+    """Return a finding if a log without torque has no targets of positions either."""
     if any(axis.position_ref is not None for axis in found.columns.axis):
         return []
     looked_for = found.pattern.looked_for("torque") if found.pattern is not None else ""
@@ -53,7 +57,7 @@ def _no_torque(found: Gathered) -> list[Finding]:
 
 
 def _partly(found: Gathered, field: str, words: str, name: str) -> list[Finding]:
-    """Return a finding if only some axes have a signal."""
+    """Return a finding if some axes have a signal and others do not."""
     axes = found.columns.axis
     having = [number for number, axis in enumerate(axes, 1) if getattr(axis, field) is not None]
     if not having or len(having) == len(axes):
@@ -67,7 +71,7 @@ def _partly(found: Gathered, field: str, words: str, name: str) -> list[Finding]
 
 
 def check_lengths(found: Gathered) -> list[Finding]:
-    """Check that every signal and the time column have as many samples as the first of them."""
+    """Return a finding for each signal whose length differs from that of the time, or of the first signal."""
     lengths = {found.labels[channel]: values.size for channel, values in found.signals.items()}
     if found.time_s is not None and found.columns.time is not None:
         lengths = {found.columns.time.label: found.time_s.size, **lengths}
@@ -82,7 +86,7 @@ def check_lengths(found: Gathered) -> list[Finding]:
 
 
 def check_finite(found: Gathered) -> list[Finding]:
-    """Check every signal for NaN and infinities."""
+    """Return a finding for each signal with NaN or infinities."""
     findings = []
     for channel, values in found.signals.items():
         findings += not_finite(values, found.labels[channel], channel[1] + 1, found.time_s)
@@ -92,7 +96,10 @@ def check_finite(found: Gathered) -> list[Finding]:
 def not_finite(
     values: Floats, label: str, axis: int, time_s: Floats | None = None
 ) -> list[Finding]:
-    """Return a finding if `values` (n,) of an axis (from 1), at times if known, hold NaN or infinities."""
+    """Return a finding if `values` (n,) of an `axis` (from 1) hold NaN or infinities.
+
+    `time_s` (n,) (s), if known, adds the time of the first one.
+    """
     bad = np.flatnonzero(~np.isfinite(values))
     if not bad.size:
         return []
@@ -107,7 +114,7 @@ def not_finite(
 
 
 def check_same_rate(logs: Sequence[Log]) -> None:
-    """Raise LogError when the logs were not all sampled at the rate of the first."""
+    """Raise LogError if the sample rate of a log differs from that of the first by more than 1e-4 of it."""
     for log in logs[1:]:
         if abs(log.sample_time_s / logs[0].sample_time_s - 1.0) > RATE_TOLERANCE:
             raise LogError(
@@ -118,7 +125,7 @@ def check_same_rate(logs: Sequence[Log]) -> None:
 
 
 def time_unit(log: Log, other: Log) -> str:
-    """Return a question about the unit of time if two sample times differ by a thousand or a million."""
+    """Return a question about the unit of time if sample times differ by a factor of 1e3 or 1e6, else ""."""
     for factor, unit in ((1e3, "ms"), (1e6, "us")):
         if abs(log.sample_time_s / other.sample_time_s / factor - 1.0) < 0.01:
             return f": time in {unit}?"

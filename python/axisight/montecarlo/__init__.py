@@ -1,7 +1,7 @@
 """Monte Carlo studies: many realizations of one identification experiment.
 
-A study is a function of (design, seed, run): the same three give the same bits, on one
-thread or many, on one machine or a cluster, in one go or after an interruption.
+A run is a function of (design, seed, run). The same three give the same bits on one thread or many, on
+one machine or a cluster, with or without an interruption.
 """
 
 from axisight.montecarlo.progress import Progress

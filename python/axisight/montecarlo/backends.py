@@ -1,4 +1,4 @@
-"""Where blocks are computed: threads of this process, or the workers of a Dask cluster."""
+"""Backends that compute blocks: threads of this process, or the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from axisight.montecarlo.design import Arrays, Task, compute_block
 
 
 def available_threads() -> int:
-    """Return how many processors this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def local_blocks(
     tasks: Iterable[Task], design: str, seed: int, threads: int
 ) -> Iterator[tuple[Task, Arrays]]:
-    """Compute blocks on threads of this process, in whatever order they finish."""
+    """Yield blocks computed on threads of this process, in the order in which they finish."""
     cancel = _core.CancelToken()
     pool = ThreadPoolExecutor(threads, thread_name_prefix="axisight")
     waiting = deque(tasks)
     active: dict[Future[Arrays | None], Task] = {}
     try:
         while waiting or active:
-            # No more than this is ever held, however many runs there are.
+            # The limit keeps memory independent of the number of runs.
             while waiting and len(active) < threads + 1:
                 task = waiting.popleft()
                 active[pool.submit(compute_block, design, seed, *task, cancel)] = task
@@ -47,7 +47,7 @@ def local_blocks(
 def dask_blocks(
     tasks: Iterable[Task], design: str, seed: int, scheduler: str | None, patience_s: float
 ) -> Iterator[tuple[Task, Arrays]]:
-    """Compute blocks on the workers of a Dask scheduler; see `axisight.cluster.on_cluster`."""
+    """Yield blocks computed on the workers of a Dask scheduler; see `axisight.cluster.on_cluster`."""
 
     def call(task: Task) -> tuple[Any, ...]:
         return (compute_block, design, seed, *task)

@@ -1,4 +1,4 @@
-"""A study with everything it refers to, as plain text: what workers get and stores remember."""
+"""The design of a study as self-contained text, for workers and stores."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ Task = tuple[int, int]
 
 
 def freeze(study: Study) -> str:
-    """Return the design as canonical JSON, self-contained: the robot's text, which states its effects, is inside.
+    """Return the design as self-contained canonical JSON, including the robot's text with its effects.
 
-    The seed, the number of runs and what is only read off the result (name, quantiles) are
-    not part of it.
+    Seed, number of runs and fields that only affect the reading of results (name, quantiles) are not
+    part of it.
     """
     robot = load_robot(study.robot)
     design = study.model_dump(by_alias=True, mode="json", exclude={"seed", "runs", "name", "robot"})
@@ -54,7 +54,7 @@ def digest(design: str) -> str:
 
 
 def settings_of(design: str) -> dict[str, Any]:
-    """Return what a design holds; raises StudyError for text that is no design."""
+    """Return the settings in a design; raises StudyError for text that is not a JSON object."""
     try:
         found = parse_json(design)
     except (TypeError, ValueError) as error:
@@ -105,7 +105,7 @@ def core_study(design: str) -> _core.MonteCarloStudy:
         raise
     except InputError as error:
         raise StudyError(str(error)) from None
-    # A design that somebody changed lacks anything, or has it as anything.
+    # An edited design can lack any field, or have any type in it.
     except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
         raise StudyError(
             f"design: expected what a study is frozen to: {short(repr(error))}"
@@ -113,7 +113,7 @@ def core_study(design: str) -> _core.MonteCarloStudy:
 
 
 def _effects(design: Mapping[str, Any], robot: Robot) -> list[Effect]:
-    """Return the effects of a study, and those of the robot itself that it spreads."""
+    """Return the effects of a study, and the robot's own effects that it spreads."""
     given = [Effect(**entry) for entry in design["effect"]]
     labels = {effect.label for effect in given}
     spread = {entry["parameter"].rpartition(".")[0] for entry in design["spread"]}
@@ -126,7 +126,7 @@ def compute_block(
 ) -> Arrays | None:
     """Return the accumulators of runs ``first`` to ``first + count - 1``; None when cancelled.
 
-    A pure function of its arguments: it runs here, in a thread, or on a worker elsewhere.
+    It is a pure function of its arguments, so it can run here, in a thread, or on a remote worker.
     """
     settings = settings_of(design)
     here = version("axisight")
@@ -138,7 +138,7 @@ def compute_block(
 
 
 def differences(stored: object, wanted: object, where: str = "") -> list[str]:
-    """Return where two designs differ, as ``field: expected A (as stored), got B``."""
+    """Return the differences of two designs, as ``field: expected A (as stored), got B``."""
     if isinstance(stored, dict) and isinstance(wanted, dict):
         out = []
         for key in sorted(stored.keys() | wanted.keys()):

@@ -1,4 +1,4 @@
-"""What a study will take, by a run of it that is tried."""
+"""Estimate of time and disk space of a study, from a trial run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from axisight.montecarlo.study import Study
 @summarized
 @dataclass(frozen=True)
 class Estimate:
-    """Time [s] and room on disk [bytes] of a whole study; it prints as a phrase."""
+    """Time [s] and disk space [bytes] of a whole study; ``str`` gives them as a phrase."""
 
     runs: int
     threads: int
@@ -21,20 +21,20 @@ class Estimate:
     size_bytes: float
 
     def __str__(self) -> str:
-        """Return it in words."""
+        """Return the estimate as a phrase."""
         taken = f"{self.runs} runs take about {_duration(self.seconds)} on {self.threads} threads"
         return f"{taken} and {self.size_bytes / 1e9:.2g} GB"
 
 
 def estimate(study: Study, threads: int) -> Estimate:
-    """Return what a study will take from its beginning; raises StudyError as `run`."""
+    """Return time and disk space of a whole study; raises StudyError as `run` does."""
     design = freeze(study)
     core_study(design)
     begun = time.perf_counter()
     block = compute_block(design, study.seed, 0, 1) or {}
     seconds = time.perf_counter() - begun
     size = sum(array.nbytes for array in block.values())
-    # A block of accumulators is as large for one run as for many; responses are kept for each.
+    # The size of a block does not depend on its runs, unless it keeps their responses.
     pieces = study.runs if study.statistics.keep_responses else -(-study.runs // study.block_runs)
     return Estimate(study.runs, threads, seconds * study.runs / threads, float(size) * pieces)
 

@@ -1,4 +1,4 @@
-"""How far a study is."""
+"""Progress of a study."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from axisight.display.summary import summarized
 class Progress:
     """State of a study.
 
-    ``done`` of ``total`` runs are finished, ``failed`` of them failed; ``rate_hz`` are the
-    runs finished per second by this call, ``remaining_s`` the time left at that rate; NaN
-    before the first block. ``message`` tells of something out of the ordinary.
+    ``done`` of ``total`` runs are finished, and ``failed`` of them failed. ``rate_hz`` is the number
+    of runs per second in this call, and ``remaining_s`` the remaining time [s] at that rate; both are
+    NaN before the first block. ``message`` reports unusual events.
     """
 
     done: int
@@ -31,7 +31,7 @@ Report = Callable[[Progress], None]
 
 
 class Meter:
-    """Counts finished runs and reports."""
+    """Counter of finished runs that reports progress."""
 
     def __init__(self, total: int, report: Report | None) -> None:
         self.total = total
@@ -42,7 +42,7 @@ class Meter:
         self._report = report
 
     def found(self, runs: int, failed: int) -> None:
-        """Count runs that were stored before."""
+        """Count runs found in the store."""
         self.done += runs
         self.failed += failed
 
@@ -53,7 +53,7 @@ class Meter:
         self.report()
 
     def report(self, message: str = "") -> None:
-        """Tell the caller where the study is."""
+        """Report the progress to the caller."""
         if self._report is None:
             return
         elapsed = max(time.monotonic() - self._begun, 1e-9)

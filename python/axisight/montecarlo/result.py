@@ -1,4 +1,4 @@
-"""From stored blocks to the result."""
+"""The result of a study from its stored blocks."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ _SQUARED = ("variance_real", "variance_imag", "covariance")
 
 
 class Fold:
-    """Merges blocks in the order of their runs; one block is in memory at a time.
+    """Accumulator that merges blocks in the order of their runs, whatever order they arrive in.
 
-    Blocks may come in any order: those that come early wait.
+    Blocks that arrive early are kept until their turn.
     """
 
     def __init__(self, study: Study, design: str, tasks: list[Task]) -> None:
@@ -50,7 +50,7 @@ class Fold:
         self._failed: list[NDArray[np.uint64]] = []
 
     def add(self, task: Task, arrays: Arrays) -> None:
-        """Merge a block as soon as all before it are merged."""
+        """Merge a block as soon as all earlier ones are merged."""
         self._early[task] = arrays
         while self._order and self._order[0] in self._early:
             block = self._early.pop(self._order.popleft())
@@ -114,8 +114,8 @@ def _dataset(
 def failures(result: xr.Dataset) -> pd.DataFrame:
     """Return the failed runs of a result, one row each: run, seed, experiment, kind, detail.
 
-    ``detail`` is the sample at which the run stopped, or the number of singular lines.
-    ``singular_lines`` marks a run whose other lines were counted.
+    ``detail`` is the sample at which the run stopped, or the number of singular lines. For a run of
+    kind ``singular_lines`` the statistics include its other lines.
     """
     kinds = str(result["failed_kind"].attrs["flag_meanings"]).split()
     return pd.DataFrame(
@@ -132,8 +132,8 @@ def failures(result: xr.Dataset) -> pd.DataFrame:
 def responses(out: Path | str) -> xr.DataArray:
     """Return every response of a study stored with ``keep_responses``.
 
-    Dims (run, frequency_hz, output, input), complex; NaN where a run failed. Raises
-    StoreError if the store holds none.
+    ``out`` is the folder of the study. Dims (run, frequency_hz, output, input), complex; NaN for a
+    failed run. Raises StoreError if the store holds no responses or is damaged.
     """
     store = Store(Path(out))
     design, seed = store.begun_with()

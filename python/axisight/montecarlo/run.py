@@ -1,4 +1,4 @@
-"""Running a study."""
+"""Execution of a study."""
 
 from __future__ import annotations
 
@@ -37,15 +37,14 @@ def run(
     Parameters
     ----------
     study : a study, or its TOML file.
-    runs, seed : in the place of those of the study.
-    out : folder for the results; without one nothing is kept.
-    resume : go on with the study in ``out``: after an interruption, or to more runs. The
-        result has the same bits as one uninterrupted run. A new study is started if there
-        is none.
+    runs, seed : values that replace those of the study.
+    out : folder for the results; without it nothing is stored.
+    resume : whether to continue the study in ``out``, after an interruption or to more runs. The
+        result has the same bits as an uninterrupted run. If ``out`` has no study, a new one starts.
     backend : ``"local"`` computes on ``threads`` threads (default: all processors),
         ``"dask"`` on the workers of ``scheduler`` (default: the current client).
-    patience_s : how long a Dask cluster may be without workers [s].
-    progress : called with a :class:`Progress` after every block.
+    patience_s : longest time without workers of a Dask cluster [s].
+    progress : function called with a :class:`Progress` after every block.
 
     Returns
     -------
@@ -55,9 +54,10 @@ def run(
     ``magnitude_quantile`` with dim ``quantile``; the failed runs with dim ``failure`` (see
     :func:`failures`). Attributes hold seed, versions and the whole design.
 
-    Raises StudyError naming the field for a bad study or one that is not the stored one,
-    StoreError for a folder that cannot be written, BackendError for a cluster out of reach;
-    finished blocks are kept. Runs that fail raise nothing: they are in the result.
+    Raises StudyError naming the field for an invalid study or one that differs from the stored one,
+    StoreError for a folder that cannot be written, BackendError for a cluster that cannot be reached,
+    and InputError for invalid options. Finished blocks stay in ``out``. Failed runs raise nothing; the
+    result lists them.
 
     """
     study = study if isinstance(study, Study) else read_study(study)
@@ -108,7 +108,7 @@ def _n_failed(arrays: Arrays) -> int:
 
 
 def _tasks(study: Study) -> list[Task]:
-    """Blocks by first run and length; the last may be short."""
+    """Return the blocks as first run and length; the last may be short."""
     size = study.block_runs
     return [(first, min(size, study.runs - first)) for first in range(0, study.runs, size)]
 
@@ -129,7 +129,7 @@ def _prepare(store: Store, study: Study, design: str, resume: bool) -> None:
 
 
 def _missing(store: Store, tasks: list[Task], meter: Meter) -> list[Task]:
-    """Return the blocks to compute: absent, shorter than wanted, or damaged."""
+    """Return the blocks to compute: those absent, too short or damaged."""
     stored, out = store.stored(), []
     for first, count in tasks:
         if stored.get(first) != count:

@@ -7,8 +7,8 @@ Layout of the folder of a study::
         blocks/00000032-32/    accumulators of runs 32 to 63, their SHA-256 in the attributes
         result/                the finished result, an xarray Dataset
 
-A block is written beside the store and moved in by one rename, so a killed process leaves
-either all of it or nothing. Blocks that fail their checksum are computed again.
+The store writes a block to a folder next to it and moves it in by one rename, so a killed process
+leaves either all of a block or nothing. Blocks that fail their checksum are computed again.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ FORMAT: Final = "axisight.montecarlo.store/1"
 
 # One file per array instead of a tree of folders.
 _FLAT: Final[dict[str, Any]] = {"name": "default", "configuration": {"separator": "."}}
-# All that a block is written in; whatever else a description names is nothing of ours.
+# All types and codecs that this module writes; others come from foreign or changed files.
 _INTEGERS = [f"{sign}int{n}" for sign in ("", "u") for n in (8, 16, 32, 64)]
 _TYPES: Final = frozenset(["bool", *_INTEGERS, "float32", "float64", "complex64", "complex128"])
 _CODECS: Final = ("bytes", "zstd")
-# What blocks may declare, at all and for each byte on disk.
+# Limits of the declared size of blocks, in total and per byte on disk, against crafted files.
 _MOST_BYTES: Final = 2**28
 _MOST_PER_BYTE: Final = 1000
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn what the disk refuses into a StoreError that names the path."""
+    """Convert errors of the disk to a StoreError that names the path."""
     try:
         yield
     except OSError as error:
@@ -77,7 +77,7 @@ class Store:
         self.blocks = self.root / "blocks"
 
     def create(self, study_toml: str, provenance: Mapping[str, Any]) -> None:
-        """Start a store; the folder is new or empty."""
+        """Create the store in a new or empty folder."""
         with writing(self.folder):
             new = self.folder / ".tmp-root"
             shutil.rmtree(new, ignore_errors=True)
@@ -87,17 +87,17 @@ class Store:
             new.rename(self.root)
 
     def provenance(self) -> dict[str, Any]:
-        """Return what the store was made with; raises StoreError, which says what to do, for one that is damaged."""
+        """Return the provenance of the store; raises StoreError, with advice, for a damaged one."""
         if not self.root.is_dir():
             raise StoreError(f"{self.root}: expected a store of a study, got nothing")
         try:
             return dict(_opened(self.root).attrs)
-        # Damage shows as anything that a reader of JSON or of groups can raise.
+        # Damaged files make the readers of JSON and groups raise exceptions of any type.
         except Exception as error:
             raise self.damaged(short(str(error))) from None
 
     def begun_with(self) -> tuple[str, int]:
-        """Return design and seed; raises StoreError for a store without, or whose design was changed."""
+        """Return design and seed; raises StoreError if they are missing or the design was changed."""
         found = self.provenance()
         design, seed = found.get("design"), found.get("seed")
         if not isinstance(design, str) or not isinstance(seed, int):
@@ -107,18 +107,18 @@ class Store:
         return design, seed
 
     def damaged(self, reason: str) -> StoreError:
-        """Return the error for metadata without which nobody knows what the blocks are of."""
+        """Return the error for damaged metadata, without which the blocks have no meaning."""
         return StoreError(
             f"{self.root / 'zarr.json'}: expected what the study was begun with, got a damaged file ({reason}): "
             "put back a copy of it, or begin the study anew in another folder"
         )
 
     def path(self, first: int, count: int) -> Path:
-        """Return where a block is kept."""
+        """Return the path of a block."""
         return self.blocks / f"{first:08d}-{count}"
 
     def stored(self) -> dict[int, int]:
-        """Return the blocks present, first run to number of runs; complete, but unchecked."""
+        """Return the number of runs of each stored block by first run; blocks are not checked."""
         out: dict[int, int] = {}
         for path in self.blocks.iterdir():
             first, _, count = path.name.partition("-")
@@ -127,7 +127,7 @@ class Store:
         return out
 
     def write(self, first: int, count: int, arrays: Arrays) -> None:
-        """Keep a block, and drop the shorter ones it replaces."""
+        """Store a block, and delete the shorter ones that it replaces."""
         path = self.path(first, count)
         with writing(path):
             new = self.folder / f".tmp-{path.name}"
@@ -144,8 +144,8 @@ class Store:
                     shutil.rmtree(other)
 
     def read(self, first: int, count: int) -> Arrays | None:
-        """Return a block, or None if it is damaged, or not written as :meth:`write` does."""
-        # Damage shows as anything from a missing file to a codec's own exception.
+        """Return a block, or None if it is damaged or not written by :meth:`write`."""
+        # Damaged blocks raise exceptions of any type, from missing files to those of codecs.
         try:
             group = _opened(self.path(first, count))
             arrays = {name: np.asarray(array[...]) for name, array in group.arrays()}
@@ -154,7 +154,7 @@ class Store:
             return None
 
     def write_result(self, result: xr.Dataset) -> None:
-        """Keep the finished result beside the blocks."""
+        """Store the finished result next to the blocks."""
         target, new = self.root / "result", self.folder / ".tmp-result"
         with writing(target):
             shutil.rmtree(new, ignore_errors=True)
@@ -164,10 +164,10 @@ class Store:
 
 
 def _opened(path: Path) -> zarr.Group:
-    """Open a group whose descriptions are those that this file writes; raises ValueError for others.
+    """Return an opened group if this module can have written its metadata; raises ValueError otherwise.
 
-    Descriptions are read before Zarr follows them: they may name codecs that run what they unpack, types
-    that hold objects, and sizes without end.
+    The check comes before Zarr uses the metadata, because foreign metadata can name codecs that execute
+    what they unpack, object types, and huge sizes.
     """
     found = _described(path, "group")
     if found.get("consolidated_metadata") is not None:
@@ -193,7 +193,7 @@ def _described(path: Path, kind: str) -> dict[str, Any]:
 
 
 def _declared(path: Path) -> int:
-    """Return the bytes that an array declares; raises ValueError for other types and codecs than ours."""
+    """Return the declared size of an array [bytes]; raises ValueError for foreign types and codecs."""
     found = _described(path, "array")
     shape, kind = found["shape"], found["data_type"]
     codecs = [(codec["name"], set(codec)) for codec in found["codecs"]]
@@ -208,7 +208,7 @@ def _declared(path: Path) -> int:
 
 
 def check_same(store: Store, design: str, seed: int) -> None:
-    """Raise StudyError naming the fields that differ from what the store was made with."""
+    """Raise StudyError naming the fields in which a study differs from the stored one."""
     stored = store.provenance()
     if stored.get("format") != FORMAT:
         raise StudyError(
@@ -225,8 +225,8 @@ def check_same(store: Store, design: str, seed: int) -> None:
 
 @contextmanager
 def open_store(folder: Path) -> Iterator[Store]:
-    """Own the folder of a study: no other process writes there meanwhile."""
-    # The system lets go of the lock when the process ends, however it ends.
+    """Open the store of a study with a lock, so that no other process writes to it."""
+    # The system releases the lock when the process ends in any way.
     lock = FileLock(folder / ".lock", blocking=False)
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""What a study is, in Python and in TOML."""
+"""The settings of a study, in Python and in TOML."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from axisight.simulation import Method
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
-# What numbers of the core can hold; how long all of it may be is said by the core.
+# The range of numbers of the core, which itself checks the total length.
 Count = Annotated[int, Field(ge=0, le=10**9)]
 AtLeastOne = Annotated[int, Field(ge=1, le=10**9)]
 JointName = Annotated[str, Field(min_length=1, max_length=200)]
@@ -38,7 +38,7 @@ class _Model(BaseModel):
 class Plant(_Model):
     """The simulated plant.
 
-    ``model`` is ``"linear"`` (linearized about the start, propagated exactly; ``substeps``
+    ``model`` is ``"linear"`` (linearized about the start, propagated exactly, with ``substeps``
     per sample for the ripple) or ``"nonlinear"`` (``method``, ``tolerance``, ``substeps``
     as in :func:`axisight.simulate`). ``start_rad`` (n_axes,) are the driven joint angles
     at rest; default the operating point of the robot.
@@ -54,8 +54,8 @@ class Plant(_Model):
 class Multisine(_Model):
     """Random-phase multisine, Wernholt (2004), (7.5): flat spectrum over ``band_hz``.
 
-    ``grid``: all multiples of ``1 / period_s`` in the band, or the odd ones. Every run has
-    its own phases, scaled to the largest sample ``peak_rad_s`` (motor side).
+    ``grid`` selects all multiples of ``1 / period_s`` in the band, or the odd ones. Every run has its
+    own phases, and a scale that makes its largest sample ``peak_rad_s`` (motor side).
     """
 
     period_s: Positive
@@ -75,8 +75,8 @@ class Square(_Model):
 class Excitation(_Model):
     """Velocity references ``T r_ms(t) + r_sq(t)``, one experiment per axis.
 
-    ``directions`` is T: ``"identity"`` (T1), ``"t2"``, ``"hadamard"``, or rows over axes and
-    columns over experiments.
+    ``directions`` is T: ``"identity"`` (T1), ``"t2"``, ``"hadamard"``, or a matrix with one row per
+    axis and one column per experiment.
     """
 
     multisine: Multisine
@@ -85,11 +85,11 @@ class Excitation(_Model):
 
 
 class Measurement(_Model):
-    """What is measured: periods waited, periods averaged, sensor noise, and which response.
+    """The measurement: waiting periods, averaged periods, sensor noise, and the response.
 
-    The noise is white, or of first order with corner ``noise_cutoff_hz``; positions come in
-    steps of ``position_resolution_rad`` (motor side) unless that is zero. The response
-    leads from commanded torque to motor ``output``.
+    The noise is white, or of first order with corner ``noise_cutoff_hz``. The position sensor has steps
+    of ``position_resolution_rad`` (motor side), none for zero. The response is from commanded torque
+    to motor ``output``.
     """
 
     waiting_periods: Count = 1
@@ -101,7 +101,7 @@ class Measurement(_Model):
 
 
 class EffectEntry(_Model):
-    """An effect at work, as :class:`axisight.Effect`: its axis is a number from 1 or a joint name."""
+    """An active effect, like :class:`axisight.Effect`, with its axis as a number from 1 or a joint name."""
 
     name: str
     axis: AtLeastOne | JointName | None = None
@@ -112,10 +112,9 @@ class EffectEntry(_Model):
 class Spread(_Model):
     """A parameter that varies from run to run: ``value (1 + relative z) + absolute z``.
 
-    ``parameter``: ``axis2.stiffness`` of the robot, ``payload.mass_kg`` or
-    ``torque_ripple@1.cosine_1_nm`` of an effect of the study or of the robot. ``z`` is standard normal, or
-    uniform between -1 and 1. A run whose draw is impossible (a negative stiffness) is
-    recorded as failed.
+    ``parameter`` names one of the robot (``axis2.stiffness``), or one of an effect of study or robot
+    (``payload.mass_kg``, ``torque_ripple@1.cosine_1_nm``). ``z`` is standard normal, or uniform
+    between -1 and 1. A run with an impossible draw (a negative stiffness) counts as failed.
     """
 
     parameter: str
@@ -125,10 +124,10 @@ class Spread(_Model):
 
 
 class Statistics(_Model):
-    """What is accumulated.
+    """The statistics of a study.
 
-    ``quantiles`` of the magnitude are good to ``relative_accuracy``; ``keep_responses``
-    also stores every response.
+    ``quantiles`` of the magnitude have the error ``relative_accuracy``. ``keep_responses`` stores
+    every response too.
     """
 
     quantiles: list[Fraction] = [0.05, 0.25, 0.5, 0.75, 0.95]
@@ -143,14 +142,14 @@ class Study(_Model):
     ----------
     robot : file in the format ``axisight.robot/1`` or ``/2``, or preset.
     robot_parameters : values that replace those of the robot, e.g. ``{"axis1.damping": 2e3}``.
-    seed : rules phases, noise and spread, together with the number of the run.
+    seed : determines phases, noise and spread, together with the number of the run.
     runs : number of realizations, at most 10^8.
-    block_runs : runs accumulated together; part of the design, because the order of
-        additions follows from it. A resumed study loses at most what was in progress.
-    effect, spread : lists, in TOML ``[[effect]]`` and ``[[spread]]``; an effect takes the place of
-        one of the robot with its name and axis.
+    block_runs : number of runs accumulated together. It is part of the design, because it sets the
+        order of additions. An interruption loses only blocks in progress.
+    effect, spread : lists, in TOML ``[[effect]]`` and ``[[spread]]``. An effect replaces one of the
+        robot with the same name and axis.
 
-    Raises StudyError naming the field; unknown keys are refused.
+    Raises StudyError naming the field, also for unknown keys.
 
     """
 
@@ -171,7 +170,7 @@ class Study(_Model):
     spread: list[Spread] = []
 
     def _repr_html_(self) -> str:
-        """What is studied, for notebooks; results are xarray's."""
+        """Return the settings of the study, for notebooks."""
         effects = "; ".join(_listed(e.model_dump(exclude_none=True)) for e in self.effect)
         fields = ("plant", "excitation", "measurement", "statistics")
         rows = [
@@ -186,7 +185,7 @@ class Study(_Model):
         )
 
     def changed(self, **changes: Any) -> Study:
-        """Return the study with other fields; raises StudyError naming one that cannot be."""
+        """Return the study with changed fields; raises StudyError naming an invalid one."""
         return Study(**{**self.model_dump(by_alias=True), **changes}) if changes else self
 
     def to_toml(self) -> str:
@@ -202,7 +201,7 @@ def _listed(values: dict[str, Any]) -> str:
 def read_study(source: Path | str) -> Study:
     """Return the study in a TOML file.
 
-    A robot file is looked for next to the study file. Raises StudyError naming file and
+    The path of a robot file is relative to the study file. Raises StudyError naming file and
     field.
     """
     path = Path(source)
@@ -225,7 +224,7 @@ def _message(error: ValidationError) -> str:
         where = ".".join(str(part) for part in fault["loc"])
         inner = fault.get("ctx", {}).get("error")
         if isinstance(inner, StudyError):
-            # A part of the study found its own faults; they go below this place.
+            # A nested model reports its own faults, whose names need this prefix.
             lines += [f"{where}.{line}" for line in str(inner).split("; ")]
             continue
         if fault["type"] == "extra_forbidden":

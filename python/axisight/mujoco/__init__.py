@@ -1,4 +1,4 @@
-"""What a diagnosis found in a MuJoCo simulation: effects that an MJCF has no place for, at every step."""
+"""Effects in a MuJoCo simulation that an MJCF cannot express, applied at every step."""
 
 from axisight.mujoco.applied import apply
 

@@ -1,4 +1,4 @@
-"""Effects as generalised forces of a MuJoCo simulation."""
+"""Effects as generalized forces of a MuJoCo simulation."""
 
 from __future__ import annotations
 
@@ -32,32 +32,38 @@ def apply(
     gear_ratio: ArrayLike = 1.0,
     gears: Mapping[str, str] | None = None,
 ) -> Array:
-    """Set ``data.qfrc_applied`` of joints to what effects add there, and return it (n_axes,) [Nm or N].
+    """Set ``data.qfrc_applied`` of joints to the torques of the effects; return them (n_axes,) [Nm or N].
 
-    To be called at every step, in ``mujoco.set_mjcb_control`` or between ``mj_step1`` and ``mj_step2``, after
-    ``data.ctrl`` is set. Entries of joints that no effect acts on stay; forces of your own on the others are
-    added after the call. Torques are those at the speed at the end of the step, so that dry friction stops a
-    joint and does not shake it; springs of gears are taken where they are at its beginning.
+    Call this at every step, in ``mujoco.set_mjcb_control`` or between ``mj_step1`` and ``mj_step2``, after
+    setting ``data.ctrl``. Entries of joints without effects stay. Add your own forces on the other joints
+    after the call. Torques are those at the speed at the end of the step, so that dry friction stops a joint
+    instead of shaking it. Gear springs are evaluated at the start of the step.
 
     Parameters
     ----------
     model, data : ``mujoco.MjModel`` and ``mujoco.MjData``.
-    effects : effects on single axes that are torques of the joint's angle, speed, load and command: friction
-        laws, ripple, springs, gravity compensation, what the drive makes of the command; and those inside
-        gears (backlash, hysteresis, stiffness, transmission error) where ``gears`` names one. Parameters are
-        those of the motor. The causes of a diagnosis that a model file had no place for are
-        ``Written.remaining``. The load is what arm and gravity ask of the gear, by the acceleration of the
+    effects : effects on single axes whose torque depends on the joint's angle, speed, load and command:
+        friction laws, ripple, springs, gravity compensation, changes of the drive's torque. Also effects
+        inside gears (backlash, hysteresis, stiffness, transmission error) if ``gears`` names the gear.
+        Parameters are motor side. ``Written.remaining`` holds the causes of a diagnosis that a model file
+        cannot express. The load is the gear torque that arm and gravity require, with the acceleration of the
         last step.
-    joints : names of the joints of the motors in the order of the axes; by default all that turn or slide
-        and are no gears, in the order of the model.
+    joints : names of the motors' joints in the order of the axes; by default all hinge and slide joints of
+        the model that are not gears.
     gear_ratio : joint angle per motor angle, one or (n_axes,); by default motors are on the joints.
-    gears : for joints behind an elastic gear the joint that is its spring, with its stiffness and damping, and
-        the angle of the arm less the motor's. A gear that remembers (hysteresis) does so in the last entries of
-        ``data.userdata``, from rest at the first call on; all effects on gears are in one call.
+    gears : maps a joint behind an elastic gear to the joint that is the gear's spring. The spring has
+        stiffness and damping, and its angle is the arm's minus the motor's. A gear with memory (hysteresis)
+        keeps it in the last entries of ``data.userdata``, from rest at the first call. Pass all effects on
+        gears in one call.
 
-    Raises InputError for effects that act inside gears that are not there, on sensors, controllers or masses,
-    between axes, or have a memory elsewhere; for joints that are not there; and for data without
-    positions (``mj_forward``). MissingExtraError without MuJoCo, ConvergenceError where a step is too long.
+    Raises InputError
+
+    - for effects inside gears that are not named, on sensors, controllers or masses, between axes, or with
+      memory outside gears,
+    - for unknown joints,
+    - for data without positions (call ``mj_forward``).
+
+    Raises MissingExtraError without MuJoCo, ConvergenceError if the time step is too long.
 
     """
     mujoco = _mujoco()
@@ -92,7 +98,8 @@ def apply(
         moves[:, axes.dofs].T,
         _ROUNDING * float(np.abs(load).max() + np.abs(command / ratio).max()),
     )
-    # MuJoCo damps springs by the speed at the end: what takes damping off is of the same.
+    # MuJoCo damps springs with the speed at the end of the step; effects that reduce damping must use the
+    # same speed.
     at_end = _in_gears(mujoco, model, data, axes, inside, free + found @ moves)
     out = np.asarray(found + known - in_gears + at_end)
     data.qfrc_applied[dofs] = out[acting]
@@ -100,7 +107,7 @@ def apply(
 
 
 def _placed(model: Any, axes: Axes, effect: Effect) -> Effect:
-    """Return an effect with the number of its axis in place of the name of its joint."""
+    """Return an effect with the number of its axis instead of the joint's name."""
     if not effect.joints:
         return effect
     names = [model.joint(int(model.dof_jntid[dof])).name for dof in axes.dofs]
@@ -113,9 +120,9 @@ def _torques(
     ratio: tuple[float, ...],
     springs: tuple[tuple[int, float, float], ...],
 ) -> tuple[EffectTorques, dict[int, Gear]]:
-    """Return what is made once of effects that are asked for at every step; gears by axis.
+    """Return the reusable part of effects that are evaluated at every step, and the gears by axis.
 
-    ``springs``: axis, stiffness and damping of gears.
+    ``springs``: axis, stiffness [Nm/rad] and damping [Nm s/rad] of each gear.
     """
     if not all(np.isfinite(r) and r != 0 for r in ratio):
         raise InputError(f"gear_ratio: expected numbers other than zero, got {list(ratio)}")
@@ -132,7 +139,7 @@ def _torques(
 def _in_gears(
     mujoco: Any, model: Any, data: Any, axes: Axes, gears: Mapping[int, Gear], speeds: Array
 ) -> Array:
-    """Set what effects inside gears add on their springs, and return what on motors (n_axes,) [Nm].
+    """Apply the effects inside gears to their springs; return their torques on the motors (n_axes,) [Nm].
 
     ``speeds`` (nv,) [rad/s].
     """
@@ -149,7 +156,7 @@ def _in_gears(
 
 
 def _kept(mujoco: Any, model: Any, data: Any, gears: Sequence[Gear]) -> Array:
-    """Return the place for what gears remember, a view into the data."""
+    """Return the memory of the gears, a view into the data."""
     need = sum(gear.n_kept for gear in gears)
     if not need:
         return np.zeros(0)
@@ -166,7 +173,7 @@ def _kept(mujoco: Any, model: Any, data: Any, gears: Sequence[Gear]) -> Array:
 
 
 def _load(mujoco: Any, model: Any, data: Any) -> Array:
-    """Return what the arm asks of its gears (nv,) [Nm]: inertia and weight, less springs and rotors."""
+    """Return the torque that the arm requires of its gears (nv,) [Nm], without springs and rotors."""
     inertia = np.zeros(model.nv)
     mujoco.mj_mulM(model, data, inertia, data.qacc)
     rotors = model.dof_armature * data.qacc
@@ -174,7 +181,7 @@ def _load(mujoco: Any, model: Any, data: Any) -> Array:
 
 
 def _moves(mujoco: Any, model: Any, data: Any, dofs: NDArray[np.int64]) -> Array:
-    """Return what torques on joints accelerate (n_axes, nv) [rad/s^2/Nm]."""
+    """Return the accelerations by torques on joints (n_axes, nv) [rad/s^2/Nm]."""
     pushes = np.zeros((len(dofs), model.nv))
     pushes[np.arange(len(dofs)), dofs] = 1.0
     moves = np.zeros_like(pushes)

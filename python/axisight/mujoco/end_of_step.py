@@ -1,4 +1,4 @@
-"""Torques that change much within a step: taken at the speed with which the step ends."""
+"""Torques that change much within a step, solved for the speed at its end."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 _MOST_STEPS = 60
 _TOLERANCE = 1e-9
-# Newton's step and halves of it are looked at together.
+# Newton's step and its halves are evaluated in one call.
 _SHARES = 0.5 ** np.arange(12)[:, None]
 
 
@@ -22,16 +22,16 @@ def torque_at_end(
 ) -> Array:
     """Return the torques x (n,) [Nm] with ``x = torque(free + gain x)``.
 
-    ``torque`` gives those (m, n) of speeds (m, n) [rad/s], each of its own speed alone; ``free`` (n,) is the
-    speed at the end of the step without them, and ``gain`` (n, n) [rad/s/Nm] what they add. Dry friction
-    at the speed of its beginning would throw a light joint to and fro; at that of its end it stops it.
-    ``least`` [Nm]: by how little ``torque`` may be off anyhow, by rounding.
+    ``torque`` maps speeds (m, n) [rad/s] to torques (m, n); each torque depends on its own speed only.
+    ``free`` (n,) is the speed at the end of the step without these torques, ``gain`` (n, n) [rad/s/Nm] what
+    they add. Dry friction at the initial speed would throw a light joint to and fro; at the final speed it
+    stops the joint. ``least`` [Nm] is the rounding error of ``torque``.
 
-    Newton's method, the best of a step and its halves. Raises ConvergenceError where it does not end.
+    Newton's method with the best of a step and its halves. Raises ConvergenceError if it does not converge.
     """
     tried = np.zeros((1, len(free)))
     for _ in range(_MOST_STEPS):
-        # Values and slopes of all in one call: it is calls that take time.
+        # Values and slopes in one call, because the number of calls decides the time.
         speed = free + tried @ gain.T
         nudge = 1e-6 * (np.abs(speed) + np.abs(free)) + 1e-12
         below, here, above = np.split(torque(np.vstack([speed - nudge, speed, speed + nudge])), 3)

@@ -1,4 +1,4 @@
-"""Effects inside gears: torques on a joint that is the spring of a gear, and what gears remember."""
+"""Effects inside gears: torques on the joint that is a gear's spring, and the memory of gears."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 
 _MOST_PARTS = 4096
-# Of what gears remember, which is of the size of one; a torque is known no better.
+# Relative tolerance of the memory; torques are no more exact.
 _TOLERANCE = 1e-6
-# Beside what effects remember: whether it has begun, when, and where motor and spring were.
+# Numbers kept besides the effects' memory: whether it has begun, the time, and the angles of motor and
+# spring.
 _KEPT = 4
 
 
 @dataclass(frozen=True)
 class Gear:
-    """A joint that is the spring of a gear: torque k and damping d of it against its angle, [Nm/rad], [Nm s/rad].
+    """A joint that is a gear's spring, with stiffness [Nm/rad] and damping [Nm s/rad].
 
-    ``ratio``: joint angle per motor angle. The angle of the spring is that of the arm less the motor's.
+    ``ratio``: joint angle per motor angle. The angle of the spring is the arm's minus the motor's.
     """
 
     effects: tuple[Effect, ...]
@@ -45,29 +46,29 @@ class Gear:
 
     @cached_property
     def n_remembered(self) -> int:
-        """How many numbers its effects remember."""
+        """Number of states that the effects remember."""
         return len(_core.state_at_rest(self._robot, self._effects, [0.0])) - 4
 
     @property
     def n_kept(self) -> int:
-        """How many numbers are kept from call to call."""
+        """Number of values kept between calls."""
         return self.n_remembered + _KEPT if self.n_remembered else 0
 
     def torques(self, place: Array, speed: Array, remembered: Array) -> Array:
-        """Return what effects add on motor joint and spring (2,) [Nm], joint side.
+        """Return the torques that effects add on motor joint and spring (2,) [Nm], joint side.
 
         ``place`` and ``speed`` are those of motor joint and spring (2,) [rad], [rad/s].
         """
         _, _, motor, arm = self._rates(place, speed, remembered)[:4]
-        # Both wheels have an inertia of one. What the motor feels moves the arm with it.
+        # Both wheels have an inertia of 1. Torque on the motor moves the arm too.
         spring = self.stiffness * place[1] + self.damping * speed[1]
         return np.array([arm + motor / self.ratio, arm + spring])
 
     def remember(self, kept: Array, time: float, place: Array) -> Array:
-        """Bring what is ``kept`` (n_kept,) to the present, in place, and return what effects remember.
+        """Advance ``kept`` (n_kept,) to the present in place, and return the effects' memory.
 
-        Motor and spring are taken to have moved evenly since the last call. Raises InputError where
-        time went back.
+        Assumes constant speeds of motor and spring since the last call. Raises InputError if time went back,
+        ConvergenceError if the step is too long for the gear.
         """
         begun, then, *_ = kept
         if begun and time < then:
@@ -83,7 +84,7 @@ class Gear:
         return kept[_KEPT:]
 
     def _led_on(self, remembered: Array, before: Array, after: Array, time: float) -> Array:
-        """Return what effects remember after an even motion, in as many parts as it takes."""
+        """Return the memory after a motion at constant speed, in as many parts as accuracy needs."""
         parts = 1
         coarse = self._in_parts(remembered, before, after, time, parts)
         while parts < _MOST_PARTS:
@@ -100,7 +101,7 @@ class Gear:
     def _in_parts(
         self, remembered: Array, before: Array, after: Array, time: float, parts: int
     ) -> Array:
-        """Runge and Kutta's classical method."""
+        """Integrate by the classical Runge-Kutta method."""
         speed, step, z = (after - before) / time, time / parts, remembered
 
         def rates(at: float, z: Array) -> Array:
@@ -123,7 +124,7 @@ class Gear:
 
 
 def _wheel(ratio: float, stiffness: float, damping: float) -> str:
-    """Return the robot file of a wheel of 1 kg m^2 behind a gear and a motor of the same inertia."""
+    """Return the robot file of a wheel of 1 kg m^2 behind a gear, and a motor of the same inertia."""
     joint = {
         "name": "wheel",
         "kind": "driven",

@@ -1,4 +1,4 @@
-"""Joints of a MuJoCo model that are axes, and springs of gears."""
+"""Joints of a MuJoCo model that are axes or gear springs."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from axisight.errors import InputError
 
-# Of numbers of a model file, of the size of one.
+# Relative difference up to which numbers of a model file count as equal.
 _SAME = 1e-9
 
 
 @dataclass(frozen=True)
 class Axes:
-    """Where the joints of axes stand in positions and in speeds, (n_axes,); the springs of gears by axis."""
+    """Indices of the axes' joints in positions and speeds, (n_axes,), and the gear springs by axis."""
 
     places: NDArray[np.int64]
     dofs: NDArray[np.int64]
@@ -27,9 +27,9 @@ class Axes:
 def axes_of(
     mujoco: Any, model: Any, data: Any, joints: Sequence[str] | None, gears: Mapping[str, str]
 ) -> Axes:
-    """Return the axes of named joints, or of all that turn or slide and are no springs of ``gears``.
+    """Return the axes of named joints, or of all hinge and slide joints that are no springs of ``gears``.
 
-    Raises InputError for joints that are not there or are no springs, and for data without positions.
+    Raises InputError for unknown joints, for gears that are no springs, and for data without positions.
     """
     kinds = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
     single = {model.joint(i).name: i for i in range(model.njnt) if model.jnt_type[i] in kinds}
@@ -60,7 +60,7 @@ def axes_of(
 
 
 def springs_of(model: Any, axes: Axes) -> tuple[tuple[int, float, float], ...]:
-    """Return axis, stiffness and damping of every gear."""
+    """Return axis, stiffness [Nm/rad] and damping [Nm s/rad] of every gear."""
     return tuple(
         (axis, float(model.jnt_stiffness[model.dof_jntid[dof]]), float(model.dof_damping[dof]))
         for axis, (_, dof) in axes.springs.items()
@@ -70,7 +70,7 @@ def springs_of(model: Any, axes: Axes) -> tuple[tuple[int, float, float], ...]:
 def _spring(
     model: Any, single: Mapping[str, int], motor: str, name: str, taken: Collection[int]
 ) -> int:
-    """Return the joint that is the spring of a gear, none of those ``taken``."""
+    """Return the joint that is the spring of a gear; raises InputError for one in ``taken`` or unsuitable."""
     joint = single.get(name)
     like = "hinge or slide joint that is none of the axes', on the axis of the motor and with stiffness"
     if joint is None or joint in taken:
@@ -87,7 +87,7 @@ def _spring(
 
 
 def _coaxial(model: Any, one: int, other: int) -> bool:
-    """Whether two joints are of one body and about one line."""
+    """Return whether two joints belong to one body and share their line."""
     same_body = model.jnt_bodyid[one] == model.jnt_bodyid[other]
     mine, its = (np.concatenate([model.jnt_axis[k], model.jnt_pos[k]]) for k in (one, other))
     return bool(same_body and np.abs(mine - its).max() < _SAME)

@@ -1,4 +1,4 @@
-"""Torques of effects at one moment, by the formulas of the package's core."""
+"""Torques of effects at one moment, by the formulas of the compiled core."""
 
 from __future__ import annotations
 
@@ -29,20 +29,21 @@ _INSTEAD = {
 
 
 def is_torque(effect: Effect) -> bool:
-    """Whether an effect is a torque of the angle, speed, load and command of one joint."""
+    """Return whether an effect is a torque that depends on angle, speed, load and command of one joint."""
     return not _why_none(effect)
 
 
 def acts_in_gear(effect: Effect) -> bool:
-    """Whether an effect acts inside the gear of one axis."""
+    """Return whether an effect acts inside the gear of one axis."""
     info = effect_info(effect.name)
     return info.acts == "transmission" and info.scope == "axis"
 
 
 def check_applicable(effects: Sequence[Effect], n_axes: int, elastic: Collection[int] = ()) -> None:
-    """Raise InputError naming the first effect that is no torque of angle, speed, load and command.
+    """Raise InputError for the first effect that is no torque of angle, speed, load and command.
 
-    ``n_axes``: how many there are, of which ``elastic`` (from 1 on) may have effects inside their gears.
+    ``n_axes``: number of axes. Axes in ``elastic`` (from 1) may have effects inside their gears. Also raises
+    InputError for an axis above ``n_axes``.
     """
     for effect in effects:
         why = _why_none(effect)
@@ -58,7 +59,7 @@ def check_applicable(effects: Sequence[Effect], n_axes: int, elastic: Collection
 
 
 def _why_none(effect: Effect) -> str:
-    """Return why an effect is no such torque, nothing where it is one."""
+    """Return why an effect is no such torque; empty if it is one."""
     info = effect_info(effect.name)
     if info.scope == "axes":
         return "it acts between two axes"
@@ -70,10 +71,10 @@ def _why_none(effect: Effect) -> str:
 
 
 class EffectTorques:
-    """Torques that effects add to joints, joint side, evaluated by the core.
+    """Torques that effects add to joints, joint side, evaluated by the compiled core.
 
-    The core knows effects of a robot. The one here has wheels on a common axis without weight: its
-    links take any forces one likes, whatever the speeds, and what is off them is the effects'.
+    The core evaluates effects of a whole robot. This class builds one from weightless wheels on a common
+    axis: their joints take any torque at any speed, so that the difference to that torque is the effects'.
     """
 
     def __init__(self, effects: Sequence[Effect], gear_ratio: ArrayLike) -> None:
@@ -86,12 +87,12 @@ class EffectTorques:
         self._weighting, self._options = Weighting.flat(self.n).core(), FitOptions()
 
     def __call__(self, angle: Array, speeds: Array, load: Array, command: Array) -> Array:
-        """Return the torques (m, n_axes) [Nm] of effects that are not on the way of the command.
+        """Return the torques (m, n_axes) [Nm] of all effects outside the command path.
 
-        At ``angle`` [rad] and ``load`` [Nm] of the joints and ``command`` [Nm] of the motors, (n_axes,), at
-        several ``speeds`` (m, n_axes) [rad/s] of the joints.
+        Arguments: ``angle`` [rad] and ``load`` [Nm] of the joints and ``command`` [Nm] of the motors, each
+        (n_axes,), and ``speeds`` (m, n_axes) [rad/s] of the joints.
         """
-        # The wheel k turns by the sum of all angles up to it, and its torque is felt by all of them.
+        # Wheel k turns by the sum of all angles up to its own, and all joints up to it feel its torque.
         wheels = load - np.append(load[1:], 0.0)
         acceleration = np.diff(wheels, prepend=0.0)
         every = np.ones((len(speeds), 1))
@@ -104,12 +105,12 @@ class EffectTorques:
         )
         motion = _core.MeasuredMotions(self._robot.core, [record], self._weighting)
         found = motion.evaluate(self._others, [], self._options)
-        # Of motors that move such a load, less what it needs without effects.
+        # Motor torque under this load, minus what it takes without effects.
         asked = must_hold(found).residual.reshape(self.n, -1).T + command
         return np.asarray(load - asked / self.ratio)
 
     def of_command(self, command: Array) -> Array:
-        """Return what the way of the command adds to joints (n_axes,) [Nm]: delivered less commanded."""
+        """Return the torque that the command path adds to joints (n_axes,) [Nm]: delivered less commanded."""
         if not self._path:
             return np.zeros(self.n)
         step = self._robot.sample_time_s
@@ -121,7 +122,7 @@ class EffectTorques:
             integrator=Integrator("rk4"),
             threads=1,
         )
-        # From rest a constant torque moves by half its acceleration times the square of the time.
+        # From rest a constant torque moves by half its acceleration times the time squared.
         moved = 2 * run["joint_position_rad"][0, 1] / step**2
         turned = np.cumsum(moved)
         delivered = np.cumsum(turned[::-1])[::-1]
@@ -129,7 +130,7 @@ class EffectTorques:
 
 
 def _wheels(ratio: Array) -> str:
-    """Return the robot file of wheels of 1 kg m^2 on one axis, each on the one before."""
+    """Return the robot file of wheels of 1 kg m^2 on one axis, each mounted on the one before."""
     joints = [
         {
             "name": f"wheel{i}",

@@ -1,4 +1,4 @@
-"""Looks at experiments and records: clipped, not yet steady, not repeating."""
+"""Check experiments and records for clipping, transients and leakage."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from axisight.records.transients import steady_state
 Real = NDArray[np.float64]
 Signals = dict[str, Real]
 
-_REPEAT_LIMIT = 1e-3  # RMS of what does not repeat in the reference over its RMS
+_REPEAT_LIMIT = 1e-3  # RMS of the part of the reference that does not repeat, over its RMS
 _PHASE_WARN_RAD, _PHASE_REFUSE_RAD = 0.01, 0.5  # at the highest line, over the record
 
 
 def check_clipping(runs: list[Experiment], start: int) -> list[RecordFinding]:
-    """Return a finding for each input or output that a limit has cut (:func:`clipped_samples`)."""
+    """Return a finding for each clipped input or output (:func:`clipped_samples`)."""
     findings = []
     for e, run in enumerate(runs, 1):
         meant = run.reference
@@ -55,7 +55,7 @@ def keep_steady(
     significance: float,
     findings: list[RecordFinding],
 ) -> int:
-    """Return how many leading periods to drop, and add what was found."""
+    """Return the number of leading periods to drop, and append the reasons to ``findings``."""
     if drop_periods is not None:
         return drop_periods
     dropped = wait
@@ -94,12 +94,12 @@ def keep_steady(
 
 
 def check_repetition(records: PeriodicRecords) -> list[RecordFinding]:
-    """Return leakage findings: signals that do not repeat with the period.
+    """Return leakage findings, about signals that do not repeat with the period.
 
-    Two causes are told apart: a period that differs from a whole number of samples (the phase at
+    Two causes are distinguished: a period that is not a whole number of samples (the phase at
     the excited lines advances from period to period), and a reference that changes. Raises
-    InputError if the phase at the highest line turns by more than 0.5 rad over the record, or
-    the periods are no copies of one another.
+    InputError if the phase at the highest line turns by more than 0.5 rad over the record, or if
+    the periods are not copies of each other.
     """
     findings: list[RecordFinding] = []
     if records.n_periods < 2:
@@ -136,7 +136,7 @@ def check_repetition(records: PeriodicRecords) -> list[RecordFinding]:
 
 
 def _slip(x: Real, records: PeriodicRecords, e: int, label: str) -> tuple[float, float]:
-    """How much later [samples] each period of ``x`` (n_periods, N) comes, and standard error."""
+    """Return the delay per period [samples] of ``x`` (n_periods, N), and its standard error."""
     try:
         delays = [estimate_delay(row, x[0], records.lines, free_sign=False) for row in x[1:]]
     except InputError as error:

@@ -1,4 +1,4 @@
-"""Signals that a limit has cut."""
+"""Detect signals that a limit has clipped."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ _STEPS = 3.0  # quantization steps the slope must point beyond the extreme
 
 
 def clipped_samples(signal: Real, meant: Real | None = None) -> int:
-    """Count the samples of ``signal`` (n,) that a limit has cut; 0 if it looks whole.
+    """Return the number of samples of ``signal`` (n,) that a limit has clipped; 0 if there is no sign of it.
 
-    Counted are runs of three or more samples equal to the largest or the smallest value whose
-    last step before the run points beyond it, by more than three steps of a quantized signal,
-    if that happens at least twice at the same extreme. The flat top of a slow or a coarsely
-    quantized signal is approached with no such slope; levels of binary signals are reached with
-    a jump from level to level. ``meant`` (n,), e.g. the reference, excuses the samples at which
-    it is itself as flat. Soft saturation is not seen.
+    A run of three or more samples at the largest or the smallest value counts if the step before it
+    extrapolates beyond that value, by more than three quantization steps. Runs count if there are at least
+    two at the same extreme. The flat top of a slow or coarsely quantized signal has no such slope before it,
+    and a binary signal jumps from level to level. ``meant`` (n,), e.g. the reference, excuses runs in which
+    it is flat itself. Soft saturation is not detected.
+
+    Raises InputError for values that are not finite or not (n,), and for ``meant`` of another shape.
     """
     signal = reals("signal", signal, "numbers of shape (n,)", 1)
     if meant is not None:
@@ -40,7 +41,7 @@ def clipped_samples(signal: Real, meant: Real | None = None) -> int:
         ]
         if len(flats) < _LEAST_TIMES:
             continue
-        if threshold is None:  # it takes longer than all the rest, and few signals have flats
+        if threshold is None:  # only now: it is the slowest part, and few signals need it
             threshold = _threshold(signal)
         hit = [
             (a, b)
@@ -54,7 +55,7 @@ def clipped_samples(signal: Real, meant: Real | None = None) -> int:
 
 
 def _threshold(signal: Real) -> float:
-    """Return by how much a slope has to point beyond an extreme."""
+    """Return by how much a slope must extrapolate beyond an extreme to count."""
     found = quantization(np.asarray(signal))
     return _STEPS * found.step if found is not None else 1e-6 * float(np.ptp(signal))
 

@@ -1,11 +1,11 @@
-"""Delays between experiments that were not started in step, and their removal.
+"""Estimate and remove delays between experiments that did not start at the same instant of the period.
 
-An experiment that starts a time tau late within the period has every DFT line turned by
-``exp(-i w tau)``. The delay is found in two steps: to a sample by the largest circular
-cross-correlation, to a fraction of it by weighted regression of the remaining phase over the
-excited lines, a straight line through zero. It is taken out in two steps too: whole samples by
-shifting, which changes no number; the rest by a phase ramp over the DFT of the whole record.
-For periodic records the ramp is exact, where a resampling filter would have edges and ripple.
+If an experiment starts a time tau late within the period, every DFT line is multiplied by
+``exp(-i w tau)``. The estimate takes two steps. The largest circular cross-correlation gives whole
+samples. A weighted regression of the remaining phase over the excited lines, through zero, gives the
+fraction. Removal takes two steps as well: a shift by whole samples, which changes no value, and a phase ramp
+over the DFT of the whole record. The ramp is exact for periodic records; a resampling filter would have edges
+and ripple.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.records.periodic import PeriodicRecords
 
-_LEAST_FIT = 0.9  # mean resultant length of the phases that are left
+_LEAST_FIT = 0.9  # mean resultant length of the remaining phases
 
 
 @summarized
@@ -28,11 +28,11 @@ class Delay:
     """A delay against the excitation.
 
     samples
-        How late the signal is [samples], in (-N/2, N/2].
+        Delay of the signal [samples], in (-N/2, N/2].
     standard_error
         Standard error [samples], from the scatter of the phases.
     sign
-        1 or -1: the signal is the excitation, or minus it.
+        1 if the signal is the delayed excitation, -1 if it is minus that.
     """
 
     samples: float
@@ -43,16 +43,16 @@ class Delay:
 def estimate_delay(
     signal: Real, excitation: Real, lines: Lines, *, free_sign: bool = True
 ) -> Delay:
-    """Return how late ``signal`` (N,) is against ``excitation`` (N,), one period of each.
+    """Return the delay of ``signal`` (N,) against ``excitation`` (N,), one period of each.
 
     lines
-        The excited lines (n_lines,), the only ones that count; each weighs with its power.
+        Excited lines (n_lines,), weighted by their power; other lines do not count.
     free_sign
-        Whether the signal may be minus the excitation. For an excitation of odd lines minus
-        is half a period late: the smaller delay is chosen.
+        Whether the signal may be minus the excitation. For an excitation with odd lines only, minus equals
+        half a period of delay: the smaller delay is returned.
 
-    Raises InputError if shapes differ, nothing is excited, or the signal is no delayed copy of
-    the excitation (mean resultant length of the remaining phases under 0.9).
+    Raises InputError if shapes differ, if nothing is excited, or if the signal is not a delayed copy of
+    the excitation (mean resultant length of the remaining phases below 0.9).
     """
     signal = reals("signal", signal, "numbers of shape (N,)", 1)
     excitation = reals("excitation", excitation, "numbers of shape (N,)", 1)
@@ -73,7 +73,7 @@ def estimate_delay(
     correlation = np.fft.irfft(spectrum, n)
     height = np.abs(correlation) if free_sign else correlation
     distance = np.minimum(np.arange(n), n - np.arange(n))
-    # Of equally high peaks (odd lines: half a period apart) the nearest.
+    # Odd lines give equally high peaks half a period apart: take the nearest.
     top = int(np.argmin(np.where(height >= height.max() * (1 - 1e-6), distance, n)))
     sign = -1 if correlation[top] < 0 else 1
     whole = top - n if top > n // 2 else top
@@ -96,13 +96,15 @@ def estimate_delay(
 def reference_delays(records: PeriodicRecords, excitation: Real | None = None) -> list[Delay]:
     """Return the delay of each experiment against the known excitation.
 
+    records
+        Periodic records with a reference; its strongest channel is compared in each experiment.
     excitation
-        One period: (N,), of which every reference channel is a multiple (r = T r_0, any sign), or
-        (n_experiments, N, n_references) as designed, with its signs. None: the strongest
-        reference of experiment 1.
+        One period of the excitation. With shape (N,), every reference channel must be a multiple of it
+        (r = T r_0, any sign). With shape (n_experiments, N, n_references), it is the reference as designed,
+        with its signs. None means the strongest reference of experiment 1.
 
-    The strongest reference channel of each experiment is compared. Raises InputError if there
-    is no reference, shapes differ, or a reference is no delayed copy of its excitation.
+    Raises InputError if there is no reference, if shapes differ, or if a reference is not a delayed copy of
+    its excitation.
     """
     instance("records", records, PeriodicRecords)
     if records.reference is None:
@@ -131,10 +133,10 @@ def reference_delays(records: PeriodicRecords, excitation: Real | None = None) -
 
 
 def advance(signals: Real, samples: float) -> Real:
-    """Return ``signals`` (n_periods, N, channels), periodic as a whole, earlier by ``samples``.
+    """Return ``signals`` (n_periods, N, channels) shifted earlier by ``samples``, as one periodic record.
 
-    Whole samples by rotation, the fraction by a phase ramp over all periods at once. The line
-    at Nyquist, if there is one, keeps only the part a real signal can have there.
+    A rotation shifts by whole samples, a phase ramp over all periods at once by the fraction. At the Nyquist
+    line, if there is one, only the real part remains.
     """
     whole = round(samples)
     fraction = samples - whole
@@ -151,14 +153,14 @@ def advance(signals: Real, samples: float) -> Real:
 def synchronise(
     records: PeriodicRecords, excitation: Real | None = None
 ) -> tuple[PeriodicRecords, list[Delay]]:
-    """Return records whose experiments are in step with the excitation, and their delays.
+    """Return ``records`` with all experiments aligned to the excitation, and the delays removed.
 
-    ``excitation`` as in :func:`reference_delays`, which also says what is raised. All signals of
-    an experiment are shifted by its one delay. The records must be in steady state: the end of
-    each wraps around to its start.
+    ``excitation`` and the errors are those of :func:`reference_delays`. All signals of an experiment are
+    shifted by the same delay. The records must be in steady state, because the end of each wraps around to
+    its start.
 
-    ``Y U^-1`` of the same experiments does not need this (a delay turns a column of U and of Y
-    alike); averaging over experiments and joint input-output estimates do.
+    ``Y U^-1`` of the same experiments does not need this, as a delay multiplies a column of U and of Y by the
+    same phase. Averages over experiments and joint input-output estimates need it.
     """
     delays = reference_delays(records, excitation)
 
@@ -166,7 +168,7 @@ def synchronise(
         pairs = zip(signal, delays, strict=True)
         return np.stack([advance(x, delay.samples) for x, delay in pairs])
 
-    assert records.reference is not None  # or reference_delays had refused
+    assert records.reference is not None  # checked by reference_delays
     moved = replace(
         records,
         input=aligned(records.input),

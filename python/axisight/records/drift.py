@@ -1,4 +1,4 @@
-"""Linear drift over the periods, as positions have it."""
+"""Estimate and remove linear drift over the periods, as in positions."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from axisight.errors import InputError
 
 
 def drift_per_period(signal: Real) -> Real:
-    """Return how far ``signal`` (..., n_periods, n_samples, channels) drifts in a period.
+    """Return the drift per period (..., channels) of ``signal`` (..., n_periods, n_samples, channels).
 
-    The slope of the period means over the period number, (..., channels): the median slope
-    over all pairs of periods (Theil 1950, Sen 1968), which a transient in the first periods
-    does not move. A straight line through the samples of a period would take part of the
-    excitation for drift; the mean over a whole period does not see it.
+    The result, in the unit of the signal, is the median slope of the period means over all pairs of periods
+    (Theil 1950, Sen 1968). A transient in the first periods does not bias it. A straight line through the
+    samples of a period would count part of the excitation as drift; the mean over a whole period does not.
 
-    Raises InputError for fewer than two periods.
+    Raises InputError for fewer than two periods, and for values that are not finite.
     """
     signal = _periods(signal)
     n_periods = signal.shape[-3]
@@ -31,7 +30,7 @@ def remove_drift(signal: Real) -> Real:
 
     The ramp is zero in the middle of the record, so that the operating point stays. Velocity
     and acceleration responses then follow from the position DFT, times i w and (i w)^2.
-    Raises InputError for fewer than two periods.
+    Raises InputError for fewer than two periods, and for values that are not finite.
     """
     signal = _periods(signal)
     slope = drift_per_period(signal)

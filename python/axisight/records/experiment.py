@@ -24,7 +24,7 @@ class Experiment:
     reference
         Reference r, (n, n_references); None if it was not recorded.
     name
-        For messages.
+        Name for messages.
 
     Raises InputError naming the field for a wrong shape, signals of different lengths, a
     non-finite value (with its place) and a sample time that is not positive.
@@ -63,10 +63,10 @@ class Experiment:
 def experiment_of_log(
     log: Log, *, output: Literal["position", "velocity", "joint_position"] = "position"
 ) -> Experiment:
-    """Return the experiment a log holds: torque as input, velocity reference as reference.
+    """Return the experiment in a ``log``: torque [Nm] as input, velocity reference [rad/s] as reference.
 
-    Channels are the log's axes. ``output`` names what is the output. Raises InputError if
-    the log does not have it, or has it on some axes only.
+    The channels are the axes of the log. ``output`` selects its output: position [rad], velocity [rad/s] or
+    joint_position [rad]. Raises InputError if the log lacks that signal on any axis, and if it has no torque.
     """
     instance("log", log, Log)
     one_of("output", output, ("position", "velocity", "joint_position"))

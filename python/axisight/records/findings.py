@@ -1,4 +1,4 @@
-"""What preparing records found, as data."""
+"""Findings of the preparation of records, as data."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from axisight.display.summary import summarized
 
 
 class FindingKind(StrEnum):
-    """What a finding is about."""
+    """The subject of a finding."""
 
     PERIOD = "period"
     """The period was found, not given."""
@@ -18,7 +18,7 @@ class FindingKind(StrEnum):
     TRANSIENT = "transient"
     """Periods before the steady state were dropped, or the steady state was not reached."""
     DISTURBED = "disturbed"
-    """A later period differs from the steady ones though an earlier one does not; it was kept."""
+    """A period after the start of the steady state differs from the steady ones; it was kept."""
     UNJUDGED = "unjudged"
     """Too few periods to judge transients, noise or leakage."""
     LEAKAGE = "leakage"
@@ -28,7 +28,7 @@ class FindingKind(StrEnum):
     DELAY = "delay"
     """An experiment started at another instant of the period; it was aligned."""
     CLIPPED = "clipped"
-    """A signal sits flat at its extreme where it was about to go on."""
+    """A limit clipped a signal: it stays flat at its extreme after a slope towards it."""
     DRIFT = "drift"
     """A linear drift was removed."""
 
@@ -43,13 +43,13 @@ class RecordFinding:
     message
         What was seen, with figures, and what to do about it.
     serious
-        True if estimates from these records are not to be trusted without a look at it.
+        True if estimates from these records cannot be trusted until somebody has checked the finding.
     experiment
-        Experiment, from 1; None if it is about all.
+        Experiment, from 1; None if the finding concerns all.
     signal
-        E.g. "output 2"; empty if it is about all.
+        Signal, e.g. "output 2"; empty if the finding concerns all.
     value
-        The figure behind it, in the unit the message names; NaN where there is none.
+        The main figure of the message, in the unit stated there; NaN if there is none.
     """
 
     kind: FindingKind
@@ -60,7 +60,7 @@ class RecordFinding:
     value: float = float("nan")
 
     def __str__(self) -> str:
-        """One line for a person."""
+        """Return the finding as one line of text."""
         where = [] if self.experiment is None else [f"experiment {self.experiment}"]
         where += [self.signal] if self.signal else []
         return f"{', '.join(where)}: {self.message}" if where else self.message

@@ -1,4 +1,4 @@
-"""Which DFT lines an excitation excites, judged by what repeats from period to period."""
+"""Find the DFT lines that an excitation excites, from the part that repeats from period to period."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class ExcitedLines:
     lines
         Excited lines k, ascending.
     margin_db
-        Level of the weakest excited line over the strongest other line [dB], at most that over
-        rounding errors.
+        Level of the weakest excited line over the strongest other line, or over rounding errors if these are
+        stronger [dB].
     """
 
     lines: Lines
@@ -33,13 +33,15 @@ class ExcitedLines:
 
 
 def repeating_lines(periods: Real, significance: float = 1e-4) -> NDArray[np.bool_]:
-    """Return a mask (n_samples // 2 + 1,) of lines whose amplitude is more than noise.
+    """Return a mask (n_samples // 2 + 1,) of the lines whose amplitude exceeds the noise.
 
-    ``periods`` has shape (n_periods, n_samples), at least two periods. At each line the
-    squared mean over the periods is compared with its variance by an F test: P |mean|^2 / s^2
-    follows F(2, 2 M (P - 1)) when nothing repeats, s^2 being pooled over M neighbouring lines.
-    ``significance`` is the probability of one false line among all of them (Bonferroni).
-    Line 0 is never reported.
+    ``periods`` has shape (n_periods, n_samples), at least two periods. At each line an F test compares the
+    squared mean over the periods with its variance. Without repetition, P |mean|^2 / s^2 follows
+    F(2, 2 M (P - 1)) with s^2 pooled over M neighbouring lines. ``significance`` is the probability of one
+    false line among all of them (Bonferroni). Line 0 is never reported.
+
+    Raises InputError for fewer than two periods, values that are not finite, and a significance that is not
+    between 0 and 1.
     """
     periods = reals("periods", periods, "numbers of shape (n_periods, n_samples)", 2)
     significance = between("significance", significance, 0, 1)
@@ -64,16 +66,17 @@ def excited_lines(signal: Real, *, floor_db: float = -40.0) -> ExcitedLines:
     """Return the excited lines of a reference (or input) in whole periods.
 
     signal
-        (n_experiments, n_periods, n_samples, n_channels); a line counts that is excited in any
-        experiment and channel.
+        Array (n_experiments, n_periods, n_samples, n_channels). A line counts if any experiment and channel
+        excites it.
     floor_db
-        Lines weaker than this against the strongest line of their channel do not count:
-        distortion and quantization repeat too.
+        Least level of a line relative to the strongest line of its channel [dB]. Weaker lines do not count,
+        because distortion and quantization repeat as well.
 
-    With two periods or more, a line must also be more than noise (:func:`repeating_lines`).
+    With two periods or more, a line must also exceed the noise (:func:`repeating_lines`).
     The line at Nyquist is never reported.
 
-    Raises InputError if nothing is excited.
+    Raises InputError if nothing is excited, for a floor that is not below 0 dB, and for fewer than three
+    samples per period.
     """
     what = "numbers of shape (n_experiments, n_periods, n_samples, n_channels)"
     signal = reals("signal", signal, what, 4)
@@ -87,7 +90,7 @@ def excited_lines(signal: Real, *, floor_db: float = -40.0) -> ExcitedLines:
     spectra = np.abs(np.fft.rfft(signal.mean(1), axis=1))[:, :n_lines]
     spectra[:, 0] = 0.0
     strongest = spectra.max(axis=1, keepdims=True)
-    # A channel at rest holds nothing but rounding errors and the leftovers of others.
+    # A channel at rest contains only rounding errors and crosstalk, which would count relative to itself.
     overall = strongest.max()
     active = strongest > 1e-6 * overall
     relative = np.where(active, spectra / np.where(active, strongest, 1.0), 0.0)
@@ -106,5 +109,5 @@ def excited_lines(signal: Real, *, floor_db: float = -40.0) -> ExcitedLines:
 
 
 def _rounding(power: Real) -> float:
-    """What rounding errors leave at a line of a signal with these line powers."""
+    """Return the power of rounding errors at one line of a signal with these line powers."""
     return float((1e-13**2) * power.sum()) + np.finfo(float).tiny

@@ -1,4 +1,4 @@
-"""Finding the period of a signal from how it repeats."""
+"""Find the period of a signal from its autocorrelation."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ _INTEGER_TOLERANCE = 0.05  # samples over the whole record
 @summarized
 @dataclass(frozen=True)
 class Period:
-    """A period and how sure it is.
+    """A period and its uncertainty.
 
     samples
         Period [samples], not rounded.
     standard_error
-        Standard error of ``samples``.
+        Standard error of ``samples`` [samples].
     repetition
         Normalised autocorrelation at the period, 1 for a signal that repeats exactly; noise of
         q times the signal's power gives 1 / (1 + q).
     n_periods
-        Whole periods in the record.
+        Number of whole periods in the record.
     """
 
     samples: float
@@ -48,7 +48,7 @@ def autocorrelation(x: Real) -> Real:
     """Return the autocorrelation of ``x`` (n,) at lags 0 to n - 1, normalised by the overlap.
 
     ``2 sum x(n) x(n + L) / sum (x(n)^2 + x(n + L)^2)`` over the overlap (McLeod and Wyvill,
-    2005): within [-1, 1], and 1 only where the signal repeats exactly.
+    2005). It lies within [-1, 1] and is 1 only if the signal repeats exactly.
     """
     products = scipy.signal.fftconvolve(x, x[::-1])[len(x) - 1 :]
     energy = np.concatenate(([0.0], np.cumsum(x * x)))
@@ -59,14 +59,14 @@ def autocorrelation(x: Real) -> Real:
 
 
 def find_period(signal: Real) -> Period:
-    """Find the period of a signal (n,) or (n, channels), of which it holds two or more.
+    """Return the period of a signal (n,) or (n, channels) that contains at least two of them.
 
-    The autocorrelation, summed over the channels, gives a lag at which the signal repeats,
-    refined over all its multiples by a straight line. The period is that lag divided by the
-    greatest common divisor of the lines that stand out of the noise: a multiple of the period
-    is never taken for it, nor is half of it where odd lines are weak.
+    The mean autocorrelation of the channels gives a lag at which the signal repeats; a straight line through
+    all multiples of the lag refines it. The period is that lag divided by the greatest common divisor of the
+    lines above the noise. So the result is never a multiple of the period, nor half of it if odd lines are
+    weak.
 
-    The signal must not drift: a reference or a torque, not a position.
+    The signal must not drift: use a reference or a torque, not a position.
 
     Raises InputError if the signal is constant, does not repeat (autocorrelation below 0.5), or
     repeats after a number of samples that is not whole.
@@ -89,13 +89,13 @@ def find_period(signal: Real) -> Period:
 
 
 def _good_lags(rho: Real) -> list[int]:
-    """The lags, ascending, at which the signal repeats about as well as it ever does."""
+    """Return the lags, ascending, with nearly the best autocorrelation; raise InputError below 0.5."""
     longest = len(rho) // 2
     reach = rho[: longest + 2]
     negative = np.flatnonzero(reach < 0)
     peaks = 1 + np.flatnonzero((reach[1:-1] > reach[:-2]) & (reach[1:-1] >= reach[2:]))
     peaks = peaks[peaks > negative[0]] if negative.size else peaks[:0]
-    # Heights between the samples, or a period of so many and a half would look worse.
+    # Interpolated heights, because a period of n + 1/2 samples would otherwise look worse than its multiples.
     left, mid, right = reach[peaks - 1], reach[peaks], reach[peaks + 1]
     bend = np.minimum(left - 2 * mid + right, -1e-15)
     heights = mid - np.clip((left - right) ** 2 / (8 * bend), -0.5, 0)
@@ -111,7 +111,7 @@ def _good_lags(rho: Real) -> list[int]:
 
 
 def _straight_line(rho: Real, lag: int) -> Period:
-    """Refine a lag by the peaks near all its multiples: their places are m times the period."""
+    """Return a lag refined by a straight line through the peaks near its multiples."""
     n = len(rho)
     orders: list[int] = []
     places: list[float] = []
@@ -126,7 +126,7 @@ def _straight_line(rho: Real, lag: int) -> Period:
         bend = min(left - 2 * mid + right, -1e-15)
         orders.append(m)
         places.append(top + float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)))
-        # As a delay between two noisy copies, and what the parabola is off by
+        # Error of the parabola, plus that of a delay between two noisy copies.
         errors.append(0.01 + float(np.sqrt(2 * max(1 - mid, 0.0) / (-bend * (n - top)))))
         slope = float(np.dot(orders, places) / np.dot(orders, orders))
     order, place = np.array(orders, float), np.array(places)
@@ -144,7 +144,7 @@ def _is_whole(found: Period) -> bool:
 
 
 def not_whole(samples: float) -> str:
-    """The advice for a period that is not a whole number of samples."""
+    """Return the message for a period that is not a whole number of samples."""
     return (
         f"period: expected a whole number of samples, got {samples:.6g}; excite at multiples of "
         f"1 / (N T) with a whole N (here {round(samples)}), or resample the record to a sample "
@@ -153,9 +153,9 @@ def not_whole(samples: float) -> str:
 
 
 def _whole_period(x: Real, lag: int) -> int:
-    """The period: a lag at which ``x`` repeats, over the common divisor of the lines in it."""
+    """Return the period: a lag at which ``x`` repeats, divided by the common divisor of its lines."""
     n = int(x.shape[1])
-    # The longest block of which there are two; its lines are the finest.
+    # The longest block that fits twice resolves the lines best.
     block = max(1, n // 2 // lag) * lag
     count = n // block
     lines: list[int] = []

@@ -1,6 +1,6 @@
 """Records of repeated experiments under a periodic excitation, cut into whole periods.
 
-The one DFT convention, for records of N samples a period at sample time T:
+The DFT convention everywhere, for records of N samples per period at sample time T:
 ``X(k) = sum_n x(n T) exp(-2 pi i k n / N)``, without scale; line k lies at ``k / (N T)`` Hz.
 Ratios of DFTs (frequency responses) do not depend on the scale; amplitudes are
 ``2 |X(k)| / N``.

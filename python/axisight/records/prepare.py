@@ -1,4 +1,4 @@
-"""From recorded signals to periodic records: split, judged, aligned, and what was found."""
+"""Turn recorded signals into periodic records: cut, check and align them, and report findings."""
 
 from __future__ import annotations
 
@@ -33,26 +33,26 @@ from axisight.records.lines import excited_lines
 from axisight.records.period import Period, find_period, not_whole
 from axisight.records.periodic import PeriodicRecords
 
-_DRIFT_LIMIT = 0.01  # samples over the whole record that rounding of a given period may cost
+_DRIFT_LIMIT = 0.01  # largest error over the whole record from rounding a given period [samples]
 _CLEAR_MARGIN_DB = 6.0
-_DRIFT_WORTH_SAYING = 1e-3  # of the RMS, a period
+_DRIFT_WORTH_SAYING = 1e-3  # share of the RMS, per period
 
 
 @summarized
 @dataclass(frozen=True)
 class Prepared:
-    """Records ready for estimation, and how they came about.
+    """Records ready for estimation, with everything that preparing them found.
 
     records
         The periods that were kept.
     period
-        Period and how sure it is; a given one has repetition NaN.
+        Period and its uncertainty; `repetition` is NaN if the caller gave the period.
     dropped_periods
-        Periods dropped before the first kept one.
+        Number of periods dropped before the first kept one.
     delays
-        Delay of each experiment that was taken out; empty if not asked for.
+        Delay removed from each experiment; empty without ``synchronise``.
     findings
-        What was seen and done, in the order of the work.
+        What was seen and done, in the order of the steps.
     """
 
     records: PeriodicRecords
@@ -83,36 +83,37 @@ def prepare_records(
     input_unit: str = "Nm",
     output_unit: str = "rad",
 ) -> Prepared:
-    """Cut experiments into whole periods in steady state and in step.
+    """Return experiments cut into whole periods in steady state, aligned on request.
 
     experiments
-        :class:`Experiment`, or `axisight.Log` (see :func:`experiment_of_log`), at the same
-        sample time and with the same channels.
+        :class:`Experiment`, or `axisight.Log` (see :func:`experiment_of_log`), with the same sample time and
+        the same channels.
     period_s
-        Period [s], a whole number of samples. None: that of the logs, or found from the reference,
-        or from the input without one (:func:`find_period`).
+        Period [s], a whole number of samples. None takes that of the logs, or else finds it from the
+        reference, or from the input without a reference (:func:`find_period`).
     lines, detection_lines
-        Excited lines; None: found from the reference, or the input (:func:`excited_lines`).
+        Excited lines, and lines left free to detect distortion. None finds the excited lines from the
+        reference, or from the input without one (:func:`excited_lines`).
     skip_s
         Time before the excitation starts [s].
     waiting_time_s
-        Periods that begin before this time after the start are dropped untested, see
+        Time after that start [s]; periods that begin before its end are dropped untested, see
         :func:`waiting_time_s`.
     drop_periods
-        Periods to drop. None: what :func:`steady_state` says at ``significance``, the probability
-        to drop a period without need, for all experiments together.
+        Number of periods to drop. None lets :func:`steady_state` decide.
+    significance
+        Probability of dropping a period without need, over all experiments together.
     drift
         Whether to remove the linear drift of the outputs (:func:`remove_drift`).
     synchronise, excitation
-        Whether to align the experiments by their references, and to what
-        (:func:`reference_delays`). Whole samples are taken out by cutting later, the rest by a
-        phase ramp.
+        Whether to align the experiments by their references, and the excitation to align to
+        (:func:`reference_delays`). Cutting later removes whole samples, a phase ramp the rest.
     input_unit, output_unit
         Units, for labels.
 
-    Every experiment keeps its last periods, as many as the shortest has. Raises InputError naming
-    the field for signals that do not fit together, a period that is not whole, differs between
-    experiments, does not fit the signals or exceeds them, and all that PeriodicRecords refuses.
+    Every experiment keeps its last periods, as many as the shortest has. Raises InputError, naming the field,
+    for signals that do not fit together, and for a period that is not whole, differs between experiments, or
+    exceeds the signals. It also raises InputError if no period is left, and as :class:`PeriodicRecords`.
     """
     given = several("experiments", experiments)
     for e in given:
@@ -160,7 +161,7 @@ def prepare_records(
         message = f"whole periods {counts} differ; the last {min(counts)} of each were kept"
         findings.append(RecordFinding(FindingKind.UNEQUAL, message))
     kept = [{k: v[-min(counts) :] for k, v in c.items()} for c in cut]
-    if drift:  # once more: now without the transient
+    if drift:  # again, from the signals as recorded but without the transient
         findings += _drift_findings(kept)
         kept = [_without_drift(c) for c in kept]
     if delays:
@@ -174,7 +175,7 @@ def prepare_records(
 
 
 def _samples(field: str, seconds: float, runs: list[Experiment], slack: float) -> int:
-    """Samples that begin in a time, at most all there are."""
+    """Return the number of samples that begin within a time, at most the length of the longest run."""
     count = not_negative(field, seconds) / runs[0].sample_time_s
     longest = max(run.n_samples for run in runs)
     return math.ceil(count - slack) if count < longest else longest
@@ -258,7 +259,7 @@ Signals = dict[str, Real]
 
 
 def _cut(runs: list[Experiment], starts: list[int], n: int) -> list[Signals]:
-    """Whole periods of every signal, (n_periods, n, channels), from the given sample on."""
+    """Return whole periods (n_periods, n, channels) of every signal, from the given sample on."""
     cut = []
     for e, (run, start) in enumerate(zip(runs, starts, strict=True), 1):
         n_periods = (run.n_samples - start) // n

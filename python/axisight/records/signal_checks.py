@@ -1,4 +1,4 @@
-"""The check of recorded signals: shape, numbers, and where they are wrong."""
+"""Check recorded signals: their shape, and that all numbers are finite."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from axisight.errors import InputError
 
 
 def recorded(name: str, value: object, axes: Sequence[str]) -> Real:
-    """Return a contiguous float64 array over ``axes``; raises InputError with the first fault."""
+    """Return a contiguous float64 array over ``axes``; raise InputError with the place of the first fault."""
     array = real_array(value)
     if array is None or array.ndim != len(axes) or 0 in array.shape:
         got = shown(value) if array is None else f"shape {array.shape}"

@@ -1,4 +1,4 @@
-"""How long to wait for the steady state, and whether it was reached."""
+"""The waiting time for the steady state, and a test of whether it was reached."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from axisight.errors import InputError
 
 Complex = NDArray[np.complex128]
 
-_BAND = 8  # lines judged together
+_BAND = 8  # lines tested together
 
 
 def mode_time_constant_s(frequency_hz: float, damping_ratio: float) -> float:
     """Return the time constant tau = 1 / (zeta w0) [s] of a mode's decay.
 
-    ``frequency_hz`` is its undamped frequency, ``damping_ratio`` lies in (0, 1]. Raises
-    InputError otherwise.
+    ``frequency_hz`` is the undamped frequency w0 / (2 pi) [Hz]. ``damping_ratio`` zeta [1] lies in (0, 1].
+    Raises InputError for other values.
     """
     positive("frequency_hz", frequency_hz)
     positive("damping_ratio", damping_ratio)
@@ -35,14 +35,14 @@ def mode_time_constant_s(frequency_hz: float, damping_ratio: float) -> float:
 
 
 def waiting_time_s(time_constant_s: float, record_s: float, signal_to_noise: float) -> float:
-    """Return the time to wait before a transient is below the noise [s], thesis (5.6).
+    """Return the time until a transient is below the noise [s], never negative, thesis (5.6).
 
-    ``T_w = tau / 2 ln(eps^2 tau / (2 T_tot))`` with tau the dominating time constant, T_tot the
-    length of the record, typically one period, and eps the ratio of the amplitudes of signal and
-    noise at a line (5.7); with little noise, 1 / eps is the relative error to be reached. After
-    T_w the mean square of ``exp(-t / tau)`` over the record is 1 / eps^2. Never negative.
+    ``T_w = tau / 2 ln(eps^2 tau / (2 T_tot))``. ``time_constant_s`` tau [s] is the dominating time constant.
+    ``record_s`` T_tot [s] is the length of the record, typically one period. ``signal_to_noise`` eps [1] is
+    the ratio of the amplitudes of signal and noise at a line (5.7). If there is hardly any noise, 1 / eps is
+    the relative error to reach. After T_w the mean square of ``exp(-t / tau)`` over the record is 1 / eps^2.
 
-    Raises InputError unless all three are positive.
+    Raises InputError unless all three are positive and the result is finite.
     """
     tau, total = positive("time_constant_s", time_constant_s), positive("record_s", record_s)
     # Logarithms one by one: the square of a large ratio overflows.
@@ -57,20 +57,20 @@ def waiting_time_s(time_constant_s: float, record_s: float, signal_to_noise: flo
 @summarized
 @dataclass(frozen=True)
 class SteadyState:
-    """The judgement of :func:`steady_state`.
+    """The result of :func:`steady_state`.
 
     first
-        Periods to drop.
+        Number of periods to drop.
     reached
-        False if the last period that could be tested still differs from those after it.
+        False if all tested periods differ from the periods taken as steady.
     significance
-        The probability to drop a period of a record in steady state.
+        Probability of dropping a period of a record in steady state.
     p_value
-        Of each tested period, (n_tested,): the probability of so large a difference from the
-        later periods by noise alone, corrected for the number of bands and channels.
+        Probability (n_tested,), for each tested period, that noise alone gives so large a difference from the
+        steady periods. It is corrected for the number of bands and channels.
     excess
-        Of each tested period, (n_tested,): RMS of its difference from the later ones over the
-        RMS that noise alone gives, in the band with the largest; 1 in steady state.
+        Ratio (n_tested,), for each tested period, of the RMS difference from the steady periods to the RMS
+        difference from noise alone, in the band with the largest ratio. It is 1 in steady state.
     """
 
     first: int
@@ -83,24 +83,24 @@ class SteadyState:
 def steady_state(
     signals: Real, last_line: int | None = None, significance: float = 0.01
 ) -> SteadyState:
-    """Judge how many leading periods of ``signals`` still hold a transient.
+    """Return how many leading periods of ``signals`` still contain a transient.
 
     signals
-        (n_periods, n_samples, n_channels), three periods or more: the input and output of one
-        experiment, or of several one after another along the channels.
+        Array (n_periods, n_samples, n_channels) with three periods or more. The channels are input and output
+        of one experiment, or of several.
     last_line
-        Highest line that counts; None is all below Nyquist.
+        Highest line that counts; None counts all lines below Nyquist.
     significance
-        Probability to drop a period of a record in steady state.
+        Probability of dropping a period of a record in steady state.
 
-    The last half of the periods, at least two, is taken to be steady; their scatter is the
-    noise. An earlier period p is compared with their mean in bands of 8 lines, excited or not:
-    the mean square of the difference over the noise follows F(2 B, 2 B (R - 1)) with R steady
-    periods; B is the number of lines in the band, lowered where few of them carry the noise
-    (Satterthwaite). The p-value of the worst band and channel counts, times their number
-    (Bonferroni). Leading periods are dropped until one passes.
+    The last half of the periods, at least two, counts as steady; their scatter is the noise. Each earlier
+    period is compared with their mean in bands of 8 lines, excited or not. The mean square of the difference
+    over the noise follows F(2 B, 2 B (R - 1)) with R steady periods. B is the number of lines in the band,
+    or less if few of them carry the noise (Satterthwaite). The p-value of a period is that of its worst band
+    and channel, times their number (Bonferroni). Leading periods are dropped until one passes.
 
-    Raises InputError for fewer than three periods.
+    Raises InputError for fewer than three periods, fewer than three samples per period, and a last line that
+    is not below Nyquist.
     """
     what = "numbers of shape (n_periods, n_samples, n_channels)"
     signals = reals("signals", signals, what, 3)
@@ -133,12 +133,12 @@ def steady_state(
 
 
 def _worst_band(square: Real, noise: Real, n_steady: int) -> tuple[float, float]:
-    """Smallest p-value over bands and channels, corrected, and the largest excess in amplitude."""
+    """Return the smallest p-value over bands and channels, corrected, and the largest amplitude ratio."""
     edges = np.arange(0, len(square), _BAND)
     size = np.diff(np.append(edges, len(square)))[:, None]
     level = np.add.reduceat(noise, edges, axis=0)
     ratio = np.add.reduceat(square, edges, axis=0) / level
-    # E s^4 of a variance from R - 1 complex degrees of freedom is larger than its square.
+    # With R - 1 complex degrees of freedom, E s^4 exceeds (E s^2)^2 by the factor 1 + 1 / (R - 1).
     spread = np.add.reduceat(noise**2, edges, axis=0) / (1 + 1 / (n_steady - 1))
     lines = np.clip(level**2 / spread, 1.0, size)
     p = np.asarray(scipy.stats.f.sf(ratio, 2 * lines, 2 * lines * (n_steady - 1)))

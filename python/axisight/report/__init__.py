@@ -1,6 +1,6 @@
 """A diagnosis in words, figures and one page.
 
-The page brings jinja2; it is loaded when first asked for.
+`render_report` and `save_report` import jinja2 when first used.
 """
 
 from __future__ import annotations

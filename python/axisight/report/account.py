@@ -1,4 +1,4 @@
-"""How a verdict came about, in words: what was compared, why rivals lost, what each move did."""
+"""The course of a diagnosis in words: the comparisons, why rivals lost, what each move did."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from axisight.gap.facts.trace import (
     Work,
 )
 
-# Rivals of the first that are told, beside none and unknown.
+# Most rivals of the leader that are reported, beside none and unknown.
 _RIVALS = 3
-# Nats of difference that a rule has to make to be told.
+# Smallest change [nat] by a rule that is reported.
 _TOLD = 0.05
-# Odds of a thousand million to one: more says nothing more.
+# Odds of 10^9 : 1 [nat]; larger odds tell the reader nothing more.
 _HOPELESS = 20.7
 
 
@@ -31,9 +31,11 @@ _HOPELESS = 20.7
 class Account:
     """The lines of an account.
 
-    ``comparisons``: of each axis and round a line on the first and lines on its rivals; ``moves`` of the
-    search in order; ``named``: what changed a probability once a cause was named; ``rules``: the rules
-    that the lines name, each with its reason; ``work``: what all of it cost.
+    - ``comparisons``: per axis and round, a line on the leader and lines on its rivals.
+    - ``moves``: of the search, in order.
+    - ``named``: changes of probability after a cause was named.
+    - ``rules``: the rules that the lines name, each with its reason.
+    - ``work``: the computing effort.
     """
 
     comparisons: tuple[tuple[str, tuple[str, ...]], ...]
@@ -43,7 +45,7 @@ class Account:
     work: tuple[str, ...]
 
     def lines(self) -> Iterator[str]:
-        """Yield the account line by line, rivals indented."""
+        """Yield the account line by line, with rivals indented."""
         for first, rivals in self.comparisons:
             yield first
             yield from (f"  {line}" for line in rivals)
@@ -54,7 +56,7 @@ class Account:
 
 
 def account(trace: Trace) -> Account:
-    """Return the account of a trace: of axes where a cause was taken in, or of all where none was."""
+    """Return the account of a trace: of axes with a cause, or of all axes if there is no cause."""
     taken = [c for c in trace.comparisons if c.taken]
     told = taken or list(trace.comparisons)
     entries = [entry for c in told for entry in c.ledger] + list(trace.named)
@@ -83,7 +85,7 @@ def _first(one: Comparison) -> str:
 
 
 def _rivals(one: Comparison) -> Iterator[str]:
-    """Yield a line for each rival of the first, for none and for unknown: by how much it lost, and by what."""
+    """Yield a line for each rival, for none and for unknown: by how much it lost, and through which rules."""
     if not one.hypotheses:
         return
     best, others = one.hypotheses[0], one.hypotheses[1 : 1 + _RIVALS]
@@ -96,7 +98,7 @@ def _rivals(one: Comparison) -> Iterator[str]:
 
 
 def _by_hypothesis(ledger: tuple[Adjustment, ...]) -> defaultdict[str, dict[str, float]]:
-    """Return what each rule added to each hypothesis, in nats."""
+    """Return the contribution of each rule to each hypothesis [nat]."""
     out: defaultdict[str, dict[str, float]] = defaultdict(dict)
     for entry in ledger:
         mine = out[entry.hypothesis]

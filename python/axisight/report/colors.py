@@ -1,15 +1,15 @@
-"""The palette as style sheet: a page whose policy is strict has colours by class only."""
+"""The palette as a style sheet: pages with a strict content policy take colours from classes only."""
 
 from __future__ import annotations
 
 from axisight.palette import AFTER, BEFORE, MEASURED, cell_colors
 
-# Finer than neighbouring colours can be told apart.
+# Finer steps than the eye can separate.
 _STEPS = 40
 
 
 def palette_css() -> str:
-    """Return the colours of curves as variables, those of the cells of maps as classes."""
+    """Return CSS: curve colours as variables, map cell colours as classes."""
     curves = f":root {{ --measured: {MEASURED}; --before: {BEFORE}; --after: {AFTER}; }}"
     shades = []
     for step in range(_STEPS + 1):

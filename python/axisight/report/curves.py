@@ -1,4 +1,4 @@
-"""Long curves as short paths: few points, small whole numbers, every peak kept."""
+"""Short SVG paths for long curves: few points, small integers, every peak kept."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ Floats = NDArray[np.float64]
 
 
 def thin(time_s: Floats, values: Floats, points: int) -> tuple[Floats, Floats]:
-    """Keep about ``points`` samples: the least and the largest of each stretch, so no peak is lost.
+    """Return about ``points`` samples of a curve: minimum and maximum of each stretch, so no peak is lost.
 
-    ``time_s`` and ``values`` have shape (n,); both results have the same shape (m,), m <= points
-    when n is larger, in time order. A stretch without finite values keeps one NaN as a gap.
+    ``time_s`` and ``values`` have shape (n,). Both results have the same shape (m,) in time order, with m <=
+    points if n is larger. A stretch without finite values keeps one NaN as a gap.
     """
     n = values.size
     if n <= points:
@@ -34,9 +34,9 @@ def thin(time_s: Floats, values: Floats, points: int) -> tuple[Floats, Floats]:
 
 
 def path(x: Floats, y: Floats) -> str:
-    """Return the SVG path through the points, rounded to whole numbers, broken where one is not finite.
+    """Return the SVG path through points rounded to integers, interrupted at non-finite ones.
 
-    ``x`` and ``y`` have shape (n,), in the coordinates of the drawing.
+    ``x`` and ``y`` have shape (n,), in drawing coordinates.
     """
     known = np.isfinite(x) & np.isfinite(y)
     starts = np.flatnonzero(known & ~np.r_[False, known[:-1]])
@@ -47,7 +47,7 @@ def path(x: Floats, y: Floats) -> str:
 def _piece(x: Floats, y: Floats) -> str:
     points = np.rint(np.column_stack([x, y])).astype(int)
     steps = np.diff(points, axis=0)
-    # A point alone is a line of no length, which round ends make visible.
+    # A single point becomes a line of zero length, which round line ends make visible.
     moves = steps[np.any(steps != 0, axis=1)] if np.any(steps) else np.zeros((1, 2), dtype=int)
     line = " ".join(f"{dx}{'' if dy < 0 else ' '}{dy}" for dx, dy in moves.tolist())
     return f"M{points[0, 0]} {points[0, 1]}l{line}"

@@ -1,4 +1,4 @@
-"""What the figures of the report show, in numbers and words; the templates draw them as SVG."""
+"""Contents of the report's figures, in numbers and words; the templates draw them as SVG."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ Floats = NDArray[np.float64]
 
 TOP = 10
 MAX_OVERLAYS = 150
-# Two points for each pixel of a wide screen: its least and its largest.
+# Minimum and maximum for each pixel of a wide screen.
 _POINTS_PER_LINE = 2_000
 _POINTS_PER_REPORT = 24_000
 _LEAST_POINTS = 200
 
-# Width of a panel and units a pixel of its height: enough to look into an eighth of the time.
+# Drawing units: width of a panel, and units per pixel of height. Enough to zoom to an eighth of the time.
 _WIDTH = 8_000
 _FINE = 10
 _TORQUE_HEIGHT, _ERROR_HEIGHT = 260, 170
 
 
 def ranking_bars(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    """Return the bars of the most probable candidates, their lengths in per cent."""
+    """Return the bars of the most probable candidates, with lengths in per cent."""
     return [
         {
             "title": shortened(title_of(c)),
@@ -56,9 +56,9 @@ def ranking_bars(diagnosis: Diagnosis) -> list[dict[str, str]]:
 
 
 def overlay_figure(diagnosis: Diagnosis, overlay: Overlay, points: int) -> dict[str, Any]:
-    """Return measured and simulated torque over time, and what the simulations miss."""
+    """Return measured and simulated torque over time, and the residuals of the simulations."""
     unit = torque_unit(diagnosis, overlay.axis)
-    # Where the kind of the axis is not known the unit is two, which no number has.
+    # An axis of unknown kind has a double unit (Nm; N), which fits no number.
     value_unit = "" if ";" in unit else f" {unit}"
     before, after = overlay.errors_nm
     time = Scale.around(overlay.time_s)
@@ -106,9 +106,9 @@ def _panel(
 
 
 def overlays_by_log(diagnosis: Diagnosis) -> tuple[list[dict[str, Any]], int]:
-    """Return the logs with the figures of their axes, one of all open, and how many were left out.
+    """Return the logs with figures of their axes, one of them open, and how many figures were left out.
 
-    The points of each figure are thinned so that all of them fit in a megabyte and a half.
+    Fewer points per figure keep all of them within 1.5 MB.
     """
     shown = diagnosis.overlays[:MAX_OVERLAYS]
     points = points_per_line(len(shown))
@@ -122,13 +122,13 @@ def overlays_by_log(diagnosis: Diagnosis) -> tuple[list[dict[str, Any]], int]:
 
 
 def points_per_line(n_overlays: int) -> int:
-    """Points each line of an overlay may keep when there are ``n_overlays`` of them."""
+    """Return the number of points per line with ``n_overlays`` overlays."""
     share = _POINTS_PER_REPORT // max(1, n_overlays)
     return int(min(_POINTS_PER_LINE, max(_LEAST_POINTS, share)))
 
 
 def first_overlay(diagnosis: Diagnosis) -> int:
-    """Index of the overlay to open with: the axis with the largest place or cause, else the first."""
+    """Return the index of the overlay to open: that of the largest place or cause, else the first."""
     axes: Sequence[int | None] = [c.axis for c in diagnosis.causes] + [
         w.axis for w in sorted(diagnosis.where, key=lambda w: -w.share)
     ]

@@ -1,4 +1,4 @@
-"""A forest plot: the numbers of all causes with their intervals, each over its own value."""
+"""A forest plot: all values of all causes with their intervals, each relative to its value."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from axisight.gap.facts.result import Cause, Diagnosis, Interval
 from axisight.palette import AFTER
 from axisight.report.wording import title_of
 
-# Where intervals are drawn, over their values [1]: what goes beyond ends in an arrow, zero is another sign.
+# Drawn range, relative to the value [1]: an interval beyond it ends in an arrow; below zero the sign changes.
 _DRAWN = (0.0, 2.0)
 
 
@@ -25,10 +25,10 @@ class _Row:
 
 
 def plot_parameters(diagnosis: Diagnosis) -> Figure:
-    """Plot every number of every cause with its 95 % interval, as shares of its value; returns a Figure.
+    """Plot every value of every cause with its 95 % interval, relative to the value; returns a Figure.
 
-    What was found stands beside each in its own unit. Numbers without an interval (of a shape that was not
-    fitted) and zeros are left out. Raises InputError where there is no cause.
+    Labels give each value in its unit. Values without an interval (shapes that were not fitted) and zeros are
+    left out. Raises InputError if there are no causes with intervals.
     """
     rows = [row for cause in diagnosis.causes for row in _rows(cause)]
     if not rows:
@@ -56,7 +56,7 @@ def plot_parameters(diagnosis: Diagnosis) -> Figure:
 
 
 def _rows(cause: Cause) -> Sequence[_Row]:
-    """Return a row for each number that was found, the cause before the first of them."""
+    """Return a row for each fitted value; the first row has the name of the cause."""
     found = []
     for name, x in cause.parameters.items():
         if x.value and x.low < x.high:
@@ -67,13 +67,13 @@ def _rows(cause: Cause) -> Sequence[_Row]:
 
 
 def _word(name: str) -> str:
-    """Return what a parameter is called, without its unit."""
+    """Return a parameter's name in words, without its unit."""
     for unit in ("_nm_s_rad", "_nm_s2_rad2", "_nm_rad3", "_nm_rad", "_rad_s", "_nm", "_rad", "_hz"):
         name = name.removesuffix(unit)
     return name.removesuffix("_s").removesuffix("_m").removesuffix("_kg").replace("_", " ")
 
 
 def _shares(x: Interval) -> tuple[float, float, float]:
-    """Return the ends of an interval and its value, over the value, the ends within what is drawn."""
+    """Return an interval's ends and value, relative to the value, with the ends clipped for drawing."""
     low, high = sorted((x.low / x.value, x.high / x.value))
     return max(low, _DRAWN[0]), 1.0, min(high, _DRAWN[1])

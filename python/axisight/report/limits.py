@@ -1,4 +1,4 @@
-"""Detection limits as a table: one line an effect, one column an axis."""
+"""Detection limits as a table: one row per effect, one column per axis."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from axisight.gap.facts.result import DetectionLimit
 from axisight.report.wording import NO_VALUE, number, plain_name
 
-# Words in place of a limit where no size would show, by what hides the effect.
+# Words for a missing limit, by what hides the effect.
 _HIDDEN = {"tolerances": "hidden", "motion": "never"}
 _MEANING = {
     "hidden": "Hidden: the simulator's own parameters, or a plainer law, make up for any size.",
@@ -18,9 +18,9 @@ _MEANING = {
 
 @dataclass(frozen=True)
 class LimitTable:
-    """``columns``: axes, and the arm where an effect acts on it; ``rows``: title, unit, values.
+    """A table: ``columns`` are the axes, plus the arm if an effect acts on it; ``rows`` title, unit, values.
 
-    ``note`` says what the words among the values mean; empty without such words.
+    ``note`` explains words among the values; it is empty without them.
     """
 
     columns: list[str]
@@ -29,7 +29,7 @@ class LimitTable:
 
 
 def limit_table(limits: Sequence[DetectionLimit], n_axes: int) -> LimitTable:
-    """Return the limits in words: ``hidden`` or ``never`` where no possible size would show."""
+    """Return the limits as texts: ``hidden`` or ``never`` where no possible size would show."""
     places: list[int | None] = list(range(1, n_axes + 1))
     if any(limit.axis is None for limit in limits):
         places.append(None)

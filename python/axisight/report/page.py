@@ -1,4 +1,4 @@
-"""A diagnosis as one self-contained page: no network, opens from disk, prints."""
+"""A diagnosis as one self-contained page, which opens from disk without a network and prints."""
 
 from __future__ import annotations
 
@@ -64,9 +64,9 @@ _NO_VERDICT = (
     NO_VERDICT,
     "The estimated noise is larger than the gap, so the logs cannot show what the simulator lacks.",
 )
-# Names of a diagnosis that say nothing of it.
+# Default names of a diagnosis, which tell the reader nothing.
 _NO_CASE = "logs"
-# Values beside the headline: about its height with a few causes, all friction of a six-axis arm.
+# Most values beside the headline: the height of a few causes, or of friction on all axes of a six-axis arm.
 _MOST_VALUES = 12
 _MODES = {
     "closed_loop": "Closed loop: robot and controller are simulated together, from the logged references.",
@@ -80,7 +80,7 @@ _COMPARED = {
 
 
 def render_report(diagnosis: Diagnosis) -> str:
-    """Return the diagnosis as one HTML page with everything it needs inside.
+    """Return the diagnosis as one self-contained HTML page.
 
     The same diagnosis gives the same text. All names and sentences are escaped.
     """
@@ -146,7 +146,7 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _filter(diagnosis: Diagnosis) -> str:
-    """Return which filter both sides of the comparison passed; nothing where no log was kept."""
+    """Return the name of the filter on both sides of the comparison; empty without a log."""
     if not diagnosis.overlays:
         return ""
     return filter_words(diagnosis.gap.compared, diagnosis.overlays[0].lowpass_hz)
@@ -175,7 +175,7 @@ def _numbers(diagnosis: Diagnosis) -> list[dict[str, str]]:
 
 
 def _gap_rows(diagnosis: Diagnosis) -> list[list[str]]:
-    """Return axis, verdict and the gap at each stage: by axis, for all, and pooled."""
+    """Return rows of axis, verdict and the gap at each stage: per axis, over all axes, and pooled."""
     gap = diagnosis.gap
     joints = diagnosis.joints
     rows = [
@@ -194,7 +194,7 @@ def _gap_rows(diagnosis: Diagnosis) -> list[list[str]]:
 
 
 def _motion(gap: Gap) -> dict[str, Any] | None:
-    """Return the errors of position and velocity by axis, where positions are compared."""
+    """Return the errors of position and velocity by axis; None unless positions are compared."""
     if gap.motion is None:
         return None
     rows = [[str(i), *map(number, row)] for i, row in enumerate(gap.motion.rows(), 1)]
@@ -220,7 +220,7 @@ def _remainder(remainder: Remainder, torque: str) -> dict[str, Any]:
 
 
 def _values(causes: Sequence[Cause]) -> dict[str, Any]:
-    """Return the values that stand beside the headline: sizes of the causes, and how many are below."""
+    """Return the sizes of the causes for the place beside the headline, and how many did not fit."""
     rows: list[dict[str, Any]] = []
     title, group = "", 0
     for cause in in_order(causes):
@@ -237,7 +237,7 @@ def _values(causes: Sequence[Cause]) -> dict[str, Any]:
 
 
 def _shapes(effect: str) -> set[str]:
-    """Return the parameters of an effect that are no sizes; of an unknown effect none."""
+    """Return the shape parameters of an effect; empty for an unknown effect."""
     info = effect_table().get(effect)
     return set() if info is None else {p.name for p in info.parameters if p.role == "shape"}
 
@@ -331,7 +331,7 @@ def _flat(data: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
 
 
 def _plain(value: Any) -> str:
-    """Return a value of a document as people read it."""
+    """Return a value of a document in readable form."""
     if value is None:
         return "none"
     if isinstance(value, bool):

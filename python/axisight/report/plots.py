@@ -77,7 +77,7 @@ def plot_simulation(run: xr.Dataset) -> Figure:
 def plot_gap_map(diagnosis: Diagnosis) -> Figure:
     """Plot the share of the gap by axis, in frequency bands and regimes; returns a Figure.
 
-    Grey cells are not significant, or on an axis without a gap.
+    Grey cells are not significant, or belong to an axis without a gap.
     """
     maps = gap_maps(diagnosis)
     rows = 1 + (len(maps)) // 2
@@ -130,12 +130,12 @@ def plot_ranking(diagnosis: Diagnosis, count: int = 10) -> Figure:
 def plot_overlay(
     diagnosis: Diagnosis, log: str | None = None, axis: int | str | None = None
 ) -> Figure:
-    """Plot measured torque and the simulator before and after, on a validation log.
+    """Plot measured torque and the simulator before and after, on a validation log; returns a Figure.
 
-    ``log`` and ``axis`` choose what to show. ``axis`` is a number from 1 or a joint name. The default is the
+    ``log`` and ``axis`` choose the data; ``axis`` is a number from 1 or a joint name. The default is the
     first log and the axis of the first cause. All curves passed the same filter, which the title states. The
-    rms errors in the legend are those of the gap. Returns a Figure. Raises InputError for a log or an axis that
-    the diagnosis does not have.
+    rms errors in the legend are those of the gap. Raises InputError for a log or an axis that the diagnosis
+    does not have.
     """
     item = _chosen(diagnosis, log, axis)
     unit = torque_unit(diagnosis, item.axis)
@@ -157,10 +157,10 @@ def plot_overlay(
     bottom.set(xlabel="time [s]", ylabel=f"error [{unit}]")
     axis_name = f"axis {axis_label(item.axis, diagnosis.joints)}"
     filtered = filter_words(diagnosis.gap.compared, item.lowpass_hz)
-    # Names are other people's: a dollar sign in one would be read as a formula.
+    # Names come from users; a dollar sign would start a formula.
     figure.suptitle(f"{item.log}, {axis_name}\n{filtered}", fontsize=10, parse_math=False)
     for panel in (top, bottom):
-        # Above the panel: no curve is hidden.
+        # Above the panel, where it hides no curve.
         panel.legend(
             loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8, frameon=False
         )

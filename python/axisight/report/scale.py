@@ -1,4 +1,4 @@
-"""Round numbers along the axis of a figure, and where they stand."""
+"""Ticks at round numbers, and positions along an axis of a figure."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Scale:
-    """An axis from ``low`` to ``high``, ``low < high``, in the unit of what it shows."""
+    """An axis from ``low`` to ``high`` (``low < high``), in the unit of its quantity."""
 
     low: float
     high: float
 
     @classmethod
     def around(cls, values: Floats, margin: float = 0.0) -> Scale:
-        """Return the scale that holds all finite ``values`` and a share ``margin`` of their span beyond."""
+        """Return the scale of all finite ``values``, with ``margin`` times their span added on both sides."""
         finite = values[np.isfinite(values)]
         low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
-        # Values that are all one stand in the middle.
+        # Equal values stand in the middle.
         room = margin * (high - low) if high > low else max(0.1 * abs(low), 1e-3)
         return cls(low - room, high + room)
 
     def share(self, value: Floats) -> Floats:
-        """Return where ``value`` stands: 0 at ``low``, 1 at ``high``."""
+        """Return the position of ``value``: 0 at ``low``, 1 at ``high``."""
         return (value - self.low) / (self.high - self.low)
 
     def ticks(self, most: int) -> list[tuple[float, str]]:
-        """Return at most ``most + 1`` round numbers as share of the axis and text."""
+        """Return at most ``most + 1`` round numbers, each as position [1] and text."""
         rough = (self.high - self.low) / most
         power = 10.0 ** math.floor(math.log10(rough))
         step = next(f * power for f in (1, 2, 5, 10) if f * power >= rough * (1 - 1e-9))
@@ -44,7 +44,7 @@ class Scale:
 
 
 def _text(value: float, step: float) -> str:
-    """Return a tick with the digits that tell it from its neighbours."""
+    """Return a tick with as many digits as tell it from its neighbours."""
     if value == 0:
         return "0"
     digits = 1 + math.floor(math.log10(abs(value))) - math.floor(math.log10(step))

@@ -1,4 +1,4 @@
-"""Pages from templates: everything escaped, nothing left out silently, nothing fetched or foreign run."""
+"""Pages from templates: all values escaped, missing values an error, no outside resources or scripts."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from axisight.report.wording import unbroken
 def rendered(
     name: str, page: dict[str, Any], *, styles: Sequence[str] = (), script: str | None = None
 ) -> str:
-    """Return the template ``name`` of this package filled in; raises jinja2.UndefinedError for a gap.
+    """Return the filled template ``name`` of this package; raises jinja2.UndefinedError for a missing value.
 
-    ``styles`` and ``script`` name further files beside it. The page may use these and what all
-    pages share, known by their hashes; whatever else stands in it is not run, and nothing is fetched.
+    ``styles`` and ``script`` name further files in the same folder. The content policy allows only these and
+    the files that all pages share, by their hashes. Browsers run nothing else and fetch nothing.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("axisight.report", "templates"),
@@ -42,7 +42,7 @@ def rendered(
 
 
 def _unbroken(value: Any) -> Any:
-    """Return a text with its numbers joined to their units; what is markup already stays as it is."""
+    """Return a text with no-break spaces between numbers and units; markup stays as it is."""
     return unbroken(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
@@ -51,7 +51,7 @@ def _source(name: str) -> str:
 
 
 def _policy(style: str, script: str | None) -> str:
-    """Return the content policy of a page whose only style and script have these texts."""
+    """Return the content policy of a page that has only this style and this script."""
     rules = ["default-src 'none'", "base-uri 'none'", "form-action 'none'"]
     rules.append(f"style-src '{_digest(style)}'")
     if script is not None:

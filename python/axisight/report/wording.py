@@ -1,4 +1,4 @@
-"""Words and numbers as figures and pages show them: plain names, sensible digits, units."""
+"""Words and numbers for figures and pages: plain names, sensible digits, units."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ Floats = NDArray[np.float64]
 
 NO_VALUE = "–"
 SIGNIFICANT_SE = 3.0
-"""Standard errors above which a cell of a map counts, unless the map's attrs say otherwise."""
+"""Standard errors from which a cell of a map is significant, unless the map's attrs state others."""
 
 _FROM_POSITIONS = ", from positions"
 _REGIMES = {"abs_speed": "speed magnitude", "speed": "speed", "accel": "acceleration"}
 
 
 def plain_name(name: str) -> str:
-    """``coulomb_friction`` as ``Coulomb friction``: words, first letter capital."""
+    """Return a name in words with a capital first letter: ``input_delay`` becomes ``Input delay``."""
     return title(name)
 
 
@@ -42,24 +42,27 @@ _FITS = {
 
 
 def fit_words(status: str) -> str:
-    """How the fit of a candidate ended. Candidates that are no cause are fitted only as far as their rank needs."""
+    """Return in words how the fit of a candidate ended.
+
+    Candidates that are no causes are fitted only as far as their rank requires.
+    """
     return _FITS.get(status, status)
 
 
 def place(axis: int | None, axes: tuple[int, int] | None = None) -> str:
-    """``axis 2``, ``axes 5 and 6``, or ``whole arm``."""
+    """Return ``axis 2``, ``axes 5 and 6``, or ``whole arm``."""
     if axes is not None:
         return f"axes {axes[0]} and {axes[1]}"
     return "whole arm" if axis is None else f"axis {axis}"
 
 
 def title_of(item: Candidate | Cause) -> str:
-    """The effect and its place in words."""
+    """Return effect and place in words."""
     return f"{plain_name(item.effect)}, {place(item.axis, item.axes)}"
 
 
 def title_of_label(label: str) -> str:
-    """``torque_constant@2`` as ``Torque constant, axis 2``; other text as a plain name."""
+    """Return ``torque_constant@2`` as ``Torque constant, axis 2``; other text as a plain name."""
     effect, at, axis = label.rpartition("@")
     if at and axis.isdigit():
         return f"{plain_name(effect)}, axis {axis}"
@@ -70,12 +73,12 @@ def title_of_label(label: str) -> str:
 
 
 def regime_name(name: str) -> str:
-    """The name of a regime in words."""
+    """Return the name of a regime in words."""
     return plain_name(_REGIMES.get(name, name))
 
 
 def number(value: float, digits: int = 3) -> str:
-    """``value`` with ``digits`` significant digits, a true minus sign, no trailing exponent noise."""
+    """Return ``value`` with ``digits`` significant digits, a true minus sign and no exponent."""
     if not math.isfinite(value):
         return _not_finite(value)
     if value == 0:
@@ -88,7 +91,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def percent(value: float, digits: int = 2) -> str:
-    """A ratio in per cent: ``0.3142`` as ``31 %``, ``0.0123`` as ``1.2 %``."""
+    """Return a ratio in per cent: ``0.3142`` as ``31 %``, ``0.0123`` as ``1.2 %``."""
     if not math.isfinite(value):
         return _not_finite(value)
     if value > LARGEST:
@@ -102,17 +105,17 @@ def percent(value: float, digits: int = 2) -> str:
     return _minus(f"{scaled:.{max(0, digits - 1 - exponent)}f} %")
 
 
-# A number and the unit after it.
+# The space between a number and its unit.
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|σ|Nm|N|kNm|Hz|ms|s|rad|mrad|rad/s|kg|m|mm|°)(?![\w]))")
 
 
 def unbroken(text: str) -> str:
-    """``13.1 %`` with a space at which no line breaks, wherever a text has a number and its unit."""
+    """Return a text with no-break spaces between numbers and units, as in ``13.1 %``."""
     return _UNIT.sub("\N{NO-BREAK SPACE}", text)
 
 
 def probability(value: float) -> str:
-    """A probability in per cent that never claims 0 or 100."""
+    """Return a probability in per cent that never claims 0 or 100."""
     if not math.isfinite(value):
         return NO_VALUE
     if value > 0.999:
@@ -123,7 +126,7 @@ def probability(value: float) -> str:
 
 
 def cell_percent(share: float) -> str:
-    """A share for a small cell: whole per cent without the sign."""
+    """Return a share in whole per cent without the sign, for a small cell."""
     if not math.isfinite(share):
         return NO_VALUE
     if 0 < share < 0.005:
@@ -132,15 +135,15 @@ def cell_percent(share: float) -> str:
 
 
 def standard_errors(value: float) -> str:
-    """A significance in standard errors: one decimal below ten, whole above."""
+    """Return a significance in standard errors: one decimal below ten, none above."""
     if not math.isfinite(value):
         return _not_finite(value)
-    # What is added takes the sign off a zero.
+    # Adding zero turns -0.0 into 0.0.
     return _minus(f"{round(value, 1) + 0.0:.1f}" if abs(value) < 9.95 else f"{value:.0f}")
 
 
 def interval_texts(interval: Interval, scale: float = 1.0) -> tuple[str, str]:
-    """Value and ``low to high``, both with the digits the interval's width supports."""
+    """Return the value and ``low to high``, both with the digits that the interval's width supports."""
     value, low, high = (scale * x for x in (interval.value, interval.low, interval.high))
     finite = [x for x in (value, low, high) if math.isfinite(x)]
     largest = max((abs(x) for x in finite), default=0.0)
@@ -159,7 +162,7 @@ def interval_texts(interval: Interval, scale: float = 1.0) -> tuple[str, str]:
 
 
 def where_text(where: Where) -> str:
-    """``Axis 2, 0.5 to 6 Hz, velocity reversal``."""
+    """Return a place of the gap in words: ``Axis 2, 0.5 to 6 Hz, velocity reversal``."""
     parts = [f"Axis {where.axis}"]
     if where.band_hz is not None:
         parts.append(f"{where.band_hz[0]:g} to {where.band_hz[1]:g} Hz")
@@ -169,7 +172,7 @@ def where_text(where: Where) -> str:
 
 
 def after_words(diagnosis: Diagnosis) -> str:
-    """What the ``after`` simulation is, for a legend."""
+    """Return the legend text of the ``after`` simulation."""
     if diagnosis.causes:
         return "after, causes added" if len(diagnosis.causes) > 1 else "after, cause added"
     gap = diagnosis.gap
@@ -179,9 +182,10 @@ def after_words(diagnosis: Diagnosis) -> str:
 
 
 def torque_unit(diagnosis: Diagnosis, axis: int) -> str:
-    """``Nm`` or ``N``, from ``provenance["axis_kinds"]``; without that, both are named.
+    """Return ``Nm`` or ``N`` by ``provenance["axis_kinds"]``, or both units if that is missing.
 
-    Where positions were compared it says so: what the stated gains command along them is no torque that was logged.
+    If positions were compared, the text says so: the torque is then what the stated gains command, and was
+    not logged.
     """
     kinds = diagnosis.provenance.get("axis_kinds")
     unit = "Nm; N if prismatic"
@@ -191,13 +195,13 @@ def torque_unit(diagnosis: Diagnosis, axis: int) -> str:
 
 
 def torque_word(unit: str) -> str:
-    """What a quantity in ``unit``, as `torque_unit` has it, is called."""
+    """Return the word for a quantity in ``unit``, a text of `torque_unit`."""
     kind = "force" if unit.removesuffix(_FROM_POSITIONS) == "N" else "torque"
     return f"{'commanded' if unit.endswith(_FROM_POSITIONS) else 'motor'} {kind}"
 
 
 def filter_words(compared: Compared, lowpass_hz: float | None) -> str:
-    """Which filter measured and simulated signals passed before they are drawn and subtracted."""
+    """Return the name of the filter on measured and simulated signals."""
     if lowpass_hz is None:
         return "Measured and simulated torque are compared as sampled, without a filter."
     what = (
@@ -210,10 +214,10 @@ def filter_words(compared: Compared, lowpass_hz: float | None) -> str:
 
 @dataclass(frozen=True)
 class GapMap:
-    """One map ready to draw: arrays of shape (n_axes, n_columns), labels as text.
+    """A map ready to draw: arrays (n_axes, n_columns), labels as text.
 
-    ``share`` and ``excess`` [1], ``significance`` in standard errors;
-    ``significant`` marks the cells that count.
+    ``share`` and ``excess`` [1], ``significance`` in standard errors; ``significant`` marks significant
+    cells.
     """
 
     title: str
@@ -227,7 +231,10 @@ class GapMap:
 
 
 def gap_maps(diagnosis: Diagnosis) -> list[GapMap]:
-    """The band map and every regime map that has cells, in order; of axes that are *none* no cell counts."""
+    """Return the band map and all regime maps with cells, in order.
+
+    Axes with the verdict *none* have no significant cells.
+    """
     quiet = [a.axis for a in diagnosis.axes if a.verdict == "none"]
     candidates = [("Frequency band", "band", diagnosis.band_map)] + [
         (regime_name(name), "bin", data) for name, data in diagnosis.regime_maps.items()
@@ -267,7 +274,7 @@ def _gap_map(title: str, dim: str, data: xr.Dataset, quiet: Sequence[int]) -> Ga
 
 
 def share_limit(maps: Sequence[GapMap]) -> float:
-    """The share at the dark end of the colour scale, one for all maps: a multiple of 10 %."""
+    """Return the share at the dark end of the colour scale of all maps: a multiple of 10 %."""
     largest = max(
         (float(m.share[m.significant].max()) for m in maps if m.significant.any()), default=0
     )
@@ -275,7 +282,7 @@ def share_limit(maps: Sequence[GapMap]) -> float:
 
 
 def ranked(diagnosis: Diagnosis) -> list[Candidate]:
-    """The ranking, most probable first; candidates without a probability last."""
+    """Return the candidates, the most probable first and those without a probability last."""
 
     def key(candidate: Candidate) -> float:
         return -candidate.probability if math.isfinite(candidate.probability) else math.inf
@@ -284,7 +291,7 @@ def ranked(diagnosis: Diagnosis) -> list[Candidate]:
 
 
 def shortened(text: str, length: int = 48) -> str:
-    """``text`` cut to ``length`` characters with an ellipsis."""
+    """Return ``text`` cut to ``length`` characters with an ellipsis."""
     return text if len(text) <= length else text[: length - 1].rstrip() + "…"
 
 

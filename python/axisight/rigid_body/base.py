@@ -1,7 +1,7 @@
-"""Base parameters: the fewest combinations of parameters that the torques depend on.
+"""Base parameters: the fewest combinations of parameters on which the torques depend.
 
-Numerically, after Gautier (1990): the regressor at random motions has the structural rank;
-columns that depend on earlier ones are grouped with them.
+The method is numerical, after Gautier (1990): the regressor at random motions has the structural
+rank, and columns that depend on earlier ones are grouped with them.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Singular values of the scaled random regressor: those of an arm that is not degenerate are
-# above 0.01; structural zeros are rounding, or, where axes are parallel but for angles written
-# as 1.5708, a few 1e-6.
+# Threshold for singular values of the scaled random regressor. Those of an arm that is not degenerate
+# are above 0.01. Structural zeros are rounding errors, or a few 1e-6 if the file writes angles between
+# parallel axes as 1.5708.
 TOLERANCE = 1e-5
-# Between the two there must be a gap; an ordinary arm has 1e13.
+# Least ratio of the singular values above and below the threshold; an ordinary arm has 1e13.
 LEAST_GAP = 100.0
 
 
 @summarized
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """Base parameters of a torque model, and the way to them and back.
+    """Base parameters of a torque model, with conversions to and from standard parameters.
 
     model
         The torque model.
     columns
-        Index, in the model's parameters, of the one that stands for each base parameter.
+        (n_base,), index among the model's parameters of the one that names each base parameter.
     matrix
         B, shape (n_base, n_parameters): base parameters are ``B @ parameters``. Columns of
         known parameters are zero.
@@ -49,11 +49,11 @@ class BaseParameters:
     known
         Names of parameters left out because they are known.
     singular_values
-        Of the regressor at random motions with columns scaled to unit length, largest first.
+        Singular values of the regressor at random motions, columns of unit length, largest first.
     rank, rank_qr
         Structural rank by singular values, and by QR with column pivoting.
     gap
-        Last singular value that counts over the first that does not; infinite if all count.
+        Ratio of the smallest singular value within the rank to the next one; infinite without a next.
     """
 
     model: TorqueModel
@@ -68,7 +68,7 @@ class BaseParameters:
 
     @property
     def names(self) -> list[str]:
-        """Name of the parameter that stands for each base parameter."""
+        """Name of each base parameter: that of its first parameter."""
         return [self.model.names[i] for i in self.columns]
 
     @property
@@ -78,49 +78,50 @@ class BaseParameters:
 
     @property
     def combinations(self) -> list[str]:
-        """Each base parameter in symbols, with coefficients to four digits."""
+        """Symbolic expression of each base parameter, coefficients to four digits."""
         return [
             combination(self.model.names, row, int(first))
             for row, first in zip(self.matrix, self.columns, strict=True)
         ]
 
     def __len__(self) -> int:
-        """Number of base parameters."""
+        """Return the number of base parameters."""
         return len(self.columns)
 
     def __str__(self) -> str:
-        """One combination per line, then what has no effect."""
+        """Return one combination per line, then the parameters without effect."""
         lines = [f"{i + 1:3d}  {text}" for i, text in enumerate(self.combinations)]
         lines.append(f"no effect: {', '.join(self.no_effect) or 'none'}")
         return "\n".join(lines)
 
     def from_standard(self, parameters: ArrayLike) -> Array:
-        """Return base parameters of standard ones, shape (n_base,)."""
+        """Return the base parameters (n_base,) of standard parameters (n_parameters,)."""
         return self.matrix @ vector("parameters", parameters, self.model.n_parameters)
 
     def to_standard(self, base: ArrayLike, prior: ArrayLike | None = None) -> Array:
-        """Return standard parameters with these base parameters, shape (n_parameters,).
+        """Return the standard parameters (n_parameters,) nearest to ``prior`` with base parameters ``base``.
 
-        Of the infinitely many, the one nearest to ``prior`` (default: the robot's nominal values).
-        Distances are relative: in units of the prior's entries, those of a link at least of the
-        average of their unit in that link, and where all this is zero of what has as large a share
-        in the torque as the others of its combination. So what a combination has more than by the
-        prior goes to all its parts, the more the larger their share in the torque.
-        Known parameters keep their prior value. The result gives the same torques but need not be
-        a set of links that can exist.
+        Infinitely many sets have these base parameters. ``prior`` is by default the robot's nominal
+        values. The distance is relative to the sizes of the prior's entries. The size of a link
+        parameter is at least the average of the parameters with its unit in that link. If that is
+        zero, the size gives the parameter the same share of the torque as the others of its
+        combination. The difference between a combination and its prior value is thus spread over all
+        its parameters, in the order of their share of the torque.
+        Known parameters keep their prior value. The result gives the same torques, but need not
+        describe links that can exist.
         """
         base = vector("base", base, len(self))
         start = self.model.nominal if prior is None else prior
         start = vector("prior", start, self.model.n_parameters)
         scaled = self.matrix * (scale := self._scale(start))
-        # Rows alike, or small combinations were lost beside large ones.
+        # Rows of one size, because small combinations would be lost beside large ones.
         size = np.linalg.norm(scaled, axis=1)
         missing = (base - self.matrix @ start) / size
         step, *_ = np.linalg.lstsq(scaled / size[:, None], missing, rcond=None)
         return np.asarray(start + scale * step, dtype=np.float64)
 
     def _scale(self, start: Array) -> Array:
-        """Size of a change of each parameter (n_parameters,) that counts as one, all positive."""
+        """Return the size of each parameter (n_parameters,), positive, that scales distances."""
         scale = np.abs(start)
         links = np.array([column.extra is None for column in self.model.columns])
         joints = np.array([name.rpartition(".")[0] for name in self.model.names])
@@ -142,7 +143,7 @@ class BaseParameters:
     def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, threads: int = 0) -> Array:
         """Return the regressor of the base parameters, shape (n, n_rows, n_base).
 
-        Arguments ``q``, ``v``, ``a``, ``threads`` as of :func:`torque_regressor`.
+        Arguments ``q``, ``v``, ``a``, ``threads`` are those of :func:`torque_regressor`.
         """
         return self.model.matrix(q, v, a, threads=threads)[..., self.columns]
 
@@ -157,25 +158,24 @@ def base_parameters(
     locked: bool = False,
     seed: int = 0,
 ) -> BaseParameters:
-    """Find the base parameters of a robot.
+    """Return the base parameters of a robot.
 
-    The regressor is evaluated at random positions (all of the circle; +-1 m), velocities and
-    accelerations, a function of ``seed``. Parameters are taken base to tip; one whose
-    column depends on those before it is grouped with them.
+    The function evaluates the regressor at random positions (all of the circle; +-1 m), velocities
+    and accelerations. It takes parameters from base to tip, and groups a parameter whose column
+    depends on earlier columns with them.
 
     Parameters
     ----------
     robot : the robot, with the options of :func:`torque_regressor`; or a
         :class:`TorqueModel` that holds them.
     terms, side, coupling : see :func:`torque_regressor`.
-    known : names of parameters that need no estimate and are left out.
-    locked : elastic joints stand still at zero, as in motions from motor angles. Their links then
-        move as one with the link before, and fewer parameters show.
-    seed : of the random motions.
+    known : names of parameters to leave out, because they need no estimate.
+    locked : whether elastic joints stand still at zero, as in motions from motor angles. Each of
+        their links then moves with the link before, and fewer parameters show.
+    seed : seed of the random motions.
 
-    Raises InputError for unknown names, and AxisightError if singular values and pivoted QR
-    disagree about the rank or show no gap, that is if the robot is within rounding of a
-    degenerate one.
+    Raises InputError for unknown names. Raises AxisightError if singular values and pivoted QR
+    disagree on the rank or show no gap, that is, if the robot is nearly degenerate.
 
     """
     model = as_model(robot, terms, side, coupling)
@@ -246,7 +246,7 @@ def random_factor(
     rng = np.random.default_rng(int(seed))
     n = max(500, 10 * len(columns))
     shape = (n, model.robot.n_joints)
-    # Prismatic joints get the same numbers in metres, within a metre or so of their zero.
+    # Prismatic joints get the same numbers in metres.
     q = rng.uniform(-np.pi, np.pi, shape)
     v, a = rng.normal(0.0, 2.0, shape), rng.normal(0.0, 10.0, shape)
     if locked:
@@ -273,7 +273,7 @@ def random_factor(
 def without_effect(
     model: TorqueModel, factor: Array, columns: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Return which columns are rounding only: of links against links, of drives against drives."""
+    """Return which columns are rounding only, links compared with links and drives with drives."""
     size = np.linalg.norm(factor, axis=0)
     is_link = np.array([model.columns[i].extra is None for i in columns])
     silent = np.zeros(len(columns), dtype=bool)
@@ -284,7 +284,7 @@ def without_effect(
 
 
 def vector(field: str, value: ArrayLike, n: int) -> Array:
-    """Check a vector of n finite numbers."""
+    """Return a checked vector of n finite numbers; raises InputError for others."""
     try:
         x = np.array(value, dtype=np.float64)
     except (TypeError, ValueError) as error:

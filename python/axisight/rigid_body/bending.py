@@ -1,9 +1,9 @@
-"""How much springs that a rigid-body fit takes for rigid spoil inertias.
+"""Bias of the inertias of a rigid-body fit from springs that it assumes rigid.
 
-With its motors held the arm swings at frequencies w_n. A motor that moves it at w feels
-J_a / (1 - (w / w_n)^2) instead of J_a, to first order J_a (1 + (w / w_n)^2). Of several springs with
-compliances c the motor of joint a feels M_aa + w^2 sum_f c_f M_af^2, which is the expansion of the
-equations of motion about infinite stiffness.
+With held motors the arm swings at frequencies w_n. For a motor that moves it at w, the effective
+inertia is J_a / (1 - (w / w_n)^2) instead of J_a, to first order J_a (1 + (w / w_n)^2). With several
+springs of compliances c, the effective inertia at joint a is M_aa + w^2 sum_f c_f M_af^2, from the
+expansion of the equations of motion about infinite stiffness.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 
 LEAST_BIAS = 0.01
-"""Share of an arm inertia from which its bias is a warning."""
+"""Bias as a share of an arm inertia above which there is a warning."""
 NOTED_BIAS = 0.001
-"""Share below which it is not worth a word."""
+"""Bias as a share of an arm inertia below which there is no finding."""
 CLEARLY = 3.0
-"""Standard errors of the inertia from which the bias is worth a note."""
+"""Bias in standard errors of the inertia above which there is a finding."""
 POSES = 20
 ABOVE_NOISE = 10.0
-"""Power over that of the noise from which a line counts: noise passes it once in e^10."""
+"""Least power of a line relative to the noise; noise exceeds it once in e^10 lines."""
 
 
 def bending(
@@ -81,7 +81,7 @@ def bending(
 
 
 def _springs(robot: Robot) -> tuple[NDArray[np.intp], Array]:
-    """Joints that give way, by gears or by themselves, and their compliances [rad/Nm]."""
+    """Return the joints with elastic gears and the elastic joints, and their compliances [rad/Nm]."""
     stiffness = robot.parameters()
     rigid = dict(zip(robot.axis_joints, robot.axis_is_rigid, strict=True))
     joints = [
@@ -94,10 +94,10 @@ def _springs(robot: Robot) -> tuple[NDArray[np.intp], Array]:
 
 
 def _motion_hz(model: TorqueModel, logs: Sequence[Log], cutoff_hz: float) -> Array:
-    """Root mean square frequency (n_axes,) of the acceleration of the joints below the cutoff [Hz].
+    """Return the rms frequency (n_axes,) of the joints' acceleration below the cutoff [Hz].
 
-    Spectra of second differences of the logs, where they stand out of what noise of the angles would
-    have, by their upper half; zero where nothing does.
+    It uses lines of the spectra of second differences that exceed the noise of the angles, estimated
+    from the upper half of the spectra. It is zero if no line does.
     """
     power, moment = np.zeros(model.robot.n_axes), np.zeros(model.robot.n_axes)
     for log in logs:
@@ -111,7 +111,7 @@ def _motion_hz(model: TorqueModel, logs: Sequence[Log], cutoff_hz: float) -> Arr
         floor = (density[above] / gain[above, None]).mean(axis=0) if above.any() else 0.0
         band = f <= cutoff_hz
         left = np.where(density[band] > ABOVE_NOISE * floor * gain[band, None], density[band], 0.0)
-        # Energies, so that long logs count for more.
+        # Energies give long logs more weight.
         scale = step / len(second) * step
         power += scale * left.sum(axis=0)
         moment += scale * (f[band, None] ** 2 * left).sum(axis=0)
@@ -119,7 +119,7 @@ def _motion_hz(model: TorqueModel, logs: Sequence[Log], cutoff_hz: float) -> Arr
 
 
 def _certainty(estimate: RigidBodyEstimate, q: Array) -> tuple[Array, Array]:
-    """Share of the links in the inertia of each axis, and its relative standard error."""
+    """Return the share of the links in the inertia of each axis, and its relative standard error."""
     model, base = estimate.model, estimate.base
     zero = np.zeros_like(q)
     still = model.matrix(q, zero, zero)
@@ -134,5 +134,5 @@ def _certainty(estimate: RigidBodyEstimate, q: Array) -> tuple[Array, Array]:
         at = row[base.columns]
         spread = np.sqrt(at @ estimate.covariance @ at)
         error.append(spread / abs(at @ estimate.values + row @ held))
-    # Without a standard error there is nothing to compare with.
+    # An infinite standard error keeps a bias without one from counting.
     return np.array(share), np.nan_to_num(np.array(error), nan=np.inf)

@@ -1,4 +1,4 @@
-"""Checks of an estimate against what can be: conditioning, signs of friction and inertia."""
+"""Plausibility checks of an estimate: conditioning, signs of friction and inertia."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from axisight.statistics.least_squares import unit_columns
 
 Array = NDArray[np.float64]
 
-# Published advice for excitation is a condition number below 100; ten times that costs a
-# digit more than most torques have.
+# Published advice for excitation is a condition number below 100. Ten times that loses one digit more
+# than most torque measurements have.
 MOST_CONDITION = 1e3
-# Standard errors by which something must be negative to be called so.
+# A value counts as negative if it is below zero by this many standard errors.
 CLEARLY = 3.0
-# Degrees of freedom below which a standard deviation is itself uncertain by 40 % and more.
+# With fewer degrees of freedom a standard deviation is itself uncertain by at least 40 %.
 LEAST_FREEDOM = 3.0
-# Samples at which inertias are looked at.
+# Number of samples at which the check evaluates inertias.
 LOOKS = 50
 
 
@@ -39,7 +39,7 @@ def condition(result: RigidBodyEstimate) -> list[IdentificationFinding]:
 
 
 def freedom(result: RigidBodyEstimate) -> list[IdentificationFinding]:
-    """Return a finding if standard errors rest on few blocks; intervals take that into account."""
+    """Return a finding if standard errors come from few blocks; intervals allow for that."""
     advice = "take interval(), which counts them, longer data or more blocks"
     return few_degrees(result.names, result.degrees_of_freedom, advice, serious=False)
 
@@ -47,9 +47,9 @@ def freedom(result: RigidBodyEstimate) -> list[IdentificationFinding]:
 def few_degrees(
     names: list[str], degrees: Array, advice: str, *, serious: bool
 ) -> list[IdentificationFinding]:
-    """Return a finding if standard errors rest on fewer than three degrees of freedom.
+    """Return a finding if standard errors have fewer than three degrees of freedom.
 
-    ``degrees`` (n,) are those of ``names``; ``advice`` ends the message.
+    ``degrees`` (n,) belong to ``names``; ``advice`` ends the message.
     """
     few = tuple(name for name, d in zip(names, degrees, strict=True) if d < LEAST_FREEDOM)
     if not few:
@@ -62,7 +62,7 @@ def few_degrees(
 
 
 def friction_sign(result: RigidBodyEstimate) -> list[IdentificationFinding]:
-    """Return a finding for every friction that is negative beyond doubt."""
+    """Return a finding for every friction that is negative by more than CLEARLY standard errors."""
     out = []
     names = zip(result.names, result.values, result.standard_error, strict=True)
     for name, value, error in names:
@@ -82,14 +82,13 @@ def gear_sign(
 ) -> list[IdentificationFinding]:
     """Return a finding for every axis whose torque opposes its acceleration.
 
-    Each axis is fitted by itself and its own inertia computed at poses of the data: an
-    axis whose gear ratio, angle or torque has the wrong sign wants a negative one, whatever
-    the others say.
+    The check fits each axis alone and computes its own inertia at poses of the data. That inertia is
+    negative if gear ratio, angle or torque of the axis has the wrong sign, whatever the other axes do.
     """
     model = result.model
     joints = model.robot.axis_joints
     q = motion[0][:: max(1, len(motion[0]) // LOOKS)]
-    # Unit acceleration of each motor (or joint) alone, and none at all.
+    # Unit acceleration of each motor (or joint) alone, and one row without acceleration.
     units = np.zeros((len(joints) + 1, model.robot.n_joints))
     alone = np.linalg.inv(model.coupling.position).T
     units[:-1, joints] = alone if model.side == "motor" else np.eye(len(joints))
@@ -116,7 +115,7 @@ def gear_sign(
 
 
 def _axis_alone(factors: Factors, row: int, direction: Array) -> tuple[float, float]:
-    """Value and standard error of a combination, from one row only, of least norm."""
+    """Return value and standard error of a combination, from the least-norm solution of one row."""
     k = factors.k
     r = factors.rows[row]
     unit, scale = unit_columns(r[:, :k])

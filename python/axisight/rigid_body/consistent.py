@@ -1,9 +1,9 @@
 """Physically consistent parameters: a least-squares fit over bodies that can exist.
 
 A link can exist if its pseudo-inertia, the 4 x 4 matrix of second moments of its mass
-distribution, is positive definite (Wensing, Kim and Slotine 2018). Least squares over such links
-and over rotor inertias and friction that are not negative is a convex problem with
-semidefinite cones; Clarabel (Goulart and Chen 2024) solves it.
+distribution, is positive definite (Wensing, Kim and Slotine 2018). Least squares over such links,
+with non-negative rotor inertias and friction, is a convex problem with semidefinite cones.
+Clarabel (Goulart and Chen 2024) solves it.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ Array = NDArray[np.float64]
 Status = Literal["already_consistent", "solved", "inaccurate", "failed"]
 
 LINK_PARAMETERS = 10
-"""m, m c (x y z), inertia about the link frame xx yy zz xy xz yz."""
+"""Link parameters in order: m, m c (x y z), inertia about the link frame xx yy zz xy xz yz."""
 
 _PRIOR_WEIGHT = 1e-6
 """Weight of a prior without standard deviations, relative to the best-determined direction."""
 _ON_BOUNDARY = 1e-6
-"""A least eigenvalue this little above the margin counts as at it: ten times what the solver
-leaves, and a thousandth of what thin-walled links have."""
+"""A least eigenvalue closer to the margin than this counts as at the margin. It is ten times the
+accuracy of the solver, and a thousandth of the eigenvalue of thin-walled links."""
 _ADVICE: dict[str, str] = {
     "already_consistent": "",
     "solved": "",
@@ -51,7 +51,7 @@ _ADVICE: dict[str, str] = {
 @summarized
 @dataclass(frozen=True, eq=False)
 class ConsistentParameters:
-    """Parameters of bodies that can exist, and what that cost.
+    """Parameters of bodies that can exist, and the increase of the loss for that.
 
     theta
         (n_parameters,), NaN if the solver failed.
@@ -59,20 +59,19 @@ class ConsistentParameters:
         ``"already_consistent"``: the unconstrained fit is returned; ``"solved"``;
         ``"inaccurate"``; ``"failed"``.
     loss, loss_unconstrained
-        Sum of squares ``|factor theta - target|^2`` here, and its minimum without constraints.
-        Far more than the noise accounts for means that the model lacks something.
+        Sum of squares ``|factor theta - target|^2``, and its minimum without constraints. A difference
+        far above the noise means that the model lacks something.
     least_eigenvalue
-        (n_links,) of the pseudo-inertias in the units ``mass`` and ``length_m`` make; at least
-        ``margin``.
+        (n_links,) of the pseudo-inertias, in units of ``mass`` and ``length_m``; at least ``margin``.
     boundary_links
-        Positions of the links that would like to be impossible: their least eigenvalue is at
-        the margin.
+        Positions of the links whose least eigenvalue is at the margin: without constraints they would
+        be impossible.
     boundary_parameters
         Positions of the non-negative parameters that ended at zero.
     mass, length_m
-        Typical mass [kg] and length [m] by which the problem was scaled.
+        Typical mass [kg] and length [m] that scale the problem.
     iterations
-        Of the interior-point method; 0 if it was not needed.
+        Iterations of the interior-point method; 0 if it was not needed.
     """
 
     theta: Array
@@ -93,7 +92,7 @@ def pseudo_inertia(link: ArrayLike) -> Array:
 
     ``link`` is m [kg], m c [kg m], inertia about the link frame [kg m^2] in the order xx yy zz
     xy xz yz. The matrix is ``[[S, m c], [(m c)^T, m]]`` with ``S = tr(I) / 2 - I``. Raises
-    InputError.
+    InputError for another shape and values that are not finite.
     """
     x = np.asarray(link, dtype=np.float64)
     if x.ndim < 1 or x.shape[-1] != LINK_PARAMETERS or not np.isfinite(x).all():
@@ -102,7 +101,7 @@ def pseudo_inertia(link: ArrayLike) -> Array:
 
 
 def _map() -> Array:
-    """(4, 4, 10): pseudo-inertia as a linear function of the link parameters."""
+    """Return the linear map (4, 4, 10) from link parameters to pseudo-inertia."""
     out = np.zeros((4, 4, LINK_PARAMETERS))
     out[3, 3, 0] = 1.0
     for k in range(3):
@@ -134,20 +133,20 @@ def consistent_parameters(
     Parameters
     ----------
     factor, target : (k, p) and (k,), the whitened regression, best as its triangular factor
-        ``R`` and ``Q^T y``; unidentifiable directions may be in it.
+        ``R`` and ``Q^T y``. It may have unidentifiable directions.
     links : for every link the positions in theta of its ten parameters, in the order of
         :func:`pseudo_inertia`.
     nonnegative : positions of rotor inertias and friction coefficients.
     known : values to hold parameters at, by position.
-    prior : (p,), say from CAD: what to stay close to; zeros by default.
-    prior_std : standard deviation of the prior, one number or (p,), infinite for none; by
-        default so wide that the prior decides only what the data leave open.
+    prior : (p,), values to stay close to, for example from CAD; zeros by default.
+    prior_std : standard deviation of the prior, one number or (p,), infinite for none. By default it
+        is so wide that the prior decides only directions that the data do not determine.
     margin : least eigenvalue of the pseudo-inertias, in units of a typical link.
-    max_iterations : of the solver.
+    max_iterations : most iterations of the solver.
 
-    Closeness is Euclidean, in the units of theta over ``prior_std``. If the unconstrained fit is
-    consistent it is returned as it is. Raises InputError naming the field; trouble of the
-    solver is a status.
+    The distance to the prior is Euclidean, for theta over ``prior_std``. If the unconstrained fit is
+    consistent, the function returns it. Raises InputError naming the field; a failure of the solver
+    is a status.
 
     """
     r, y = _finite("factor", factor, 2), _finite("target", target, 1)
@@ -191,22 +190,22 @@ def identify_consistent(
     max_iterations: int = 200,
     threads: int = 0,
 ) -> ConsistentParameters:
-    """Estimate all parameters of a torque model so that every body can exist.
+    """Return estimates of all parameters of a torque model, such that every body can exist.
 
     Parameters
     ----------
     model : robot, drive terms, side and couplings.
     q, v, a, torque_nm : as for :func:`identify_rigid_body`.
     torque_std_nm : standard deviation of the residual of each row, one number or (n_rows,) [Nm],
-        as ``residual_std_nm`` of an unconstrained estimate gives it.
-    known : parameters and the values to hold them at, by name.
+        for example ``residual_std_nm`` of an unconstrained estimate.
+    known : values to hold parameters at, by name.
     sample_weight : as for :func:`identify_rigid_body`.
-    prior : (n_parameters,) what to stay close to; by default the values in the robot file.
+    prior : (n_parameters,) values to stay close to; by default those of the robot file.
     prior_std, margin, max_iterations : as for :func:`consistent_parameters`.
-    threads : threads to use, 0 for all.
+    threads : number of threads, 0 for all cores.
 
-    Rotor inertias, friction, stiffness and damping are held at zero or above. Memory does not
-    grow with the number of samples. Raises InputError naming the field.
+    Rotor inertias, friction, stiffness and damping are not negative. Memory does not grow with the
+    number of samples. Raises InputError naming the field.
 
     """
     motion = model.motion(q, v, a)
@@ -250,12 +249,13 @@ def identify_consistent(
 
 
 def prior_spread(model: TorqueModel, share: float = 1.0) -> Array:
-    """Return standard deviations (n_parameters,) of the values in the robot file, as a prior.
+    """Return standard deviations (n_parameters,) for the values of the robot file as a prior.
 
-    ``share`` of each link's own mass m, of m times its radius of gyration about the link frame
-    for first moments, of m times that squared for inertias; ``share`` of each nominal rotor
-    inertia; infinite where ``model`` has no nominal value, as for friction and offsets. Raises
-    InputError.
+    They are ``share`` times a size: the mass m of a link for masses, m times its radius of gyration
+    about the link frame for first moments, and m times the square of that radius for inertias. For
+    rotor inertias the size is the nominal value. Parameters of ``model`` without nominal value, for
+    example friction and offsets, have infinite standard deviation. Raises InputError for a share that
+    is not positive.
     """
     if not (np.isfinite(share) and share > 0):
         raise InputError(f"share: expected a positive number, got {share!r}")
@@ -271,7 +271,7 @@ def prior_spread(model: TorqueModel, share: float = 1.0) -> Array:
 
 
 def link_positions(model: TorqueModel) -> NDArray[np.int64]:
-    """Return the positions (n_links, 10) of the links' parameters in those of the model."""
+    """Return the positions (n_links, 10) of the links' parameters among those of the model."""
     count = sum(column.extra is None for column in model.columns)
     return np.arange(count, dtype=np.int64).reshape(-1, LINK_PARAMETERS)
 
@@ -288,8 +288,8 @@ def nonnegative_positions(model: TorqueModel) -> list[int]:
 class _Problem:
     """The problem in scaled parameters z = theta / scale.
 
-    Links are scaled by a typical mass and length, so that the pseudo-inertia of z is that of
-    theta in those units.
+    Links are scaled by a typical mass and length, so that the pseudo-inertia of z is that of theta in
+    units of this mass and length.
     """
 
     def __init__(
@@ -337,7 +337,7 @@ class _Problem:
         )
 
     def fit(self, matrix: Array, right: Array) -> Array:
-        """Least squares without cones; what is known stays."""
+        """Return the least-squares solution without cones, with known parameters held."""
         z = np.zeros(matrix.shape[1])
         z[self.held] = self.known[self.held] / self.scale[self.held]
         left = np.delete(np.arange(len(z)), self.held)
@@ -358,14 +358,14 @@ class _Problem:
         return bool(np.all(self.eigenvalues(z) >= self.margin) and np.all(z[self.signs] >= 0))
 
     def solve(self, iterations: int) -> tuple[Array, Status, int]:
-        """Minimise ``|r|^2 / 2 + |W (z - z0)|^2 / 2`` with ``r = F z - y``.
+        """Return the minimum of ``|r|^2 / 2 + |W (z - z0)|^2 / 2`` with ``r = F z - y``.
 
-        The residual is a variable of its own: forming F^T F would square the condition.
+        The residual r is a separate variable, because F^T F would square the condition.
         """
-        import clarabel  # noqa: PLC0415 - when it is used: it loads half of SciPy
+        import clarabel  # noqa: PLC0415 - only when needed, because it loads half of SciPy
 
         k, p = self.factor.shape
-        # In units of the target, so that tolerances mean the same for every robot.
+        # Relative to the target, tolerances mean the same for every robot.
         unit = max(float(np.linalg.norm(self.target)), np.finfo(np.float64).tiny)
         quadratic = sparse.diags(np.concatenate([self.weight**2, np.ones(k)]), format="csc")
         linear = np.concatenate([-(self.weight**2) * self.prior, np.zeros(k)])
@@ -389,7 +389,7 @@ class _Problem:
         settings.verbose = False
         settings.max_iter = iterations
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-9
-        # What is known goes to the right-hand side.
+        # Known parameters go to the right-hand side.
         z = np.zeros(p + k)
         z[self.held] = self.known[self.held] / self.scale[self.held]
         left = np.delete(np.arange(p + k), self.held)
@@ -415,7 +415,7 @@ class _Problem:
 
 
 def _svec() -> tuple[Array, Array]:
-    """Upper triangles, column by column, off the diagonal times sqrt(2): of J and of 1."""
+    """Return svec of J and of 1: upper triangles by column, off-diagonal entries times sqrt(2)."""
     rows, unit = [], []
     for j in range(4):
         for i in range(j + 1):
@@ -428,7 +428,7 @@ _SVEC, _SVEC_UNIT = _svec()
 
 
 def _typical(links: Array) -> tuple[float, float]:
-    """Typical mass and radius of gyration of prior links; 10 kg and 0.5 m without."""
+    """Return typical mass and radius of gyration of prior links, by default 10 kg and 0.5 m."""
     if len(links):
         moments = np.trace(pseudo_inertia(links)[:, :3, :3], axis1=1, axis2=2)
         masses = links[:, 0]
@@ -440,7 +440,7 @@ def _typical(links: Array) -> tuple[float, float]:
 
 
 def _scales(r: Array, y: Array, links: NDArray[np.int64], mass: float, length: float) -> Array:
-    """Typical sizes: of links by mass and length, of others what alone explains the target."""
+    """Return typical sizes: of links by mass and length, of others that which alone explains the target."""
     size = np.linalg.norm(r, axis=0)
     reach = float(np.linalg.norm(y)) or 1.0
     scale = np.where(size > 0, reach / np.where(size > 0, size, 1.0), 1.0)
@@ -449,7 +449,7 @@ def _scales(r: Array, y: Array, links: NDArray[np.int64], mass: float, length: f
 
 
 def _link_scale(mass: float, length: float) -> Array:
-    """Sizes of the ten parameters of a link of some mass and length."""
+    """Return the sizes of the ten parameters of a link of this mass and length."""
     return mass * np.array([1.0, *[length] * 3, *[length**2] * 6])
 
 
@@ -467,7 +467,7 @@ def _prior_weight(prior_std: ArrayLike | None, scaled: Array, scale: Array) -> A
 
 
 def _held(known: Mapping[int, float], p: int, signs: NDArray[np.int64]) -> Array:
-    """Values (p,) to hold parameters at, NaN for those that are free."""
+    """Return the values (p,) to hold parameters at, NaN for free ones."""
     out = np.full(p, np.nan)
     places = _positions("known", list(known), p, 0)
     out[places] = _finite("known", list(known.values()), 1) if known else []
@@ -492,7 +492,7 @@ def _finite(field: str, value: ArrayLike, ndim: int) -> Array:
 def _positions(
     field: str, value: Sequence[Any] | NDArray[np.int64], p: int, width: int
 ) -> NDArray[np.int64]:
-    """Positions from 0 to p - 1, none twice, of shape (n, width), or (n,) for width 0."""
+    """Return checked positions from 0 to p - 1, none twice, (n, width), or (n,) for width 0."""
     array = np.asarray(value)
     if not array.size:
         return np.empty((0, width) if width else 0, np.int64)

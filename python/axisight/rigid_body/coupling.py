@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 @summarized
 @dataclass(frozen=True, eq=False)
 class MotorCoupling:
-    """How the motors of all driven axes are coupled to their joints.
+    """The coupling of the motors of all driven axes to their joints.
 
     position
         Matrix R, shape (n_axes, n_axes) [rad/rad]: motor angles ``phi = R q``. Without
@@ -25,8 +25,8 @@ class MotorCoupling:
         one over the ``gear_ratio`` of the robot file.
     torque
         Matrix R_tau, shape (n_axes, n_axes): joint torques ``tau_q = R_tau tau_phi``. Default
-        is the transpose of R, by virtual work; another one describes a gearbox that loses or
-        a data set whose torques were converted otherwise.
+        is the transpose of R, by virtual work. Another matrix describes a gearbox with losses, or
+        a data set with another conversion of torques.
 
     Raises InputError for matrices that are not square, not finite or not invertible.
     """
@@ -73,7 +73,7 @@ class MotorCoupling:
 
 
 def gear_coupling(robot: Robot) -> MotorCoupling:
-    """Return the coupling of the gear ratios in the robot file, each motor on its own joint."""
+    """Return the coupling by the gear ratios in the robot file, one motor per joint."""
     return MotorCoupling(np.diag(1.0 / robot.gear_ratio))
 
 

@@ -1,4 +1,4 @@
-"""Whether the data determine the base parameters, and advice where they do not."""
+"""Check whether the data determine the base parameters, and advice if they do not."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from axisight.rigid_body.regressor import TorqueModel
 
 Array = NDArray[np.float64]
 
-# Share of the samples that must run against the others for Coulomb friction to show.
+# Least share of samples in the rarer direction for Coulomb friction to show.
 LEAST_REVERSED = 0.01
 
 
@@ -48,11 +48,11 @@ def reversal_findings(shares: dict[str, float]) -> list[IdentificationFinding]:
 def rank_message(
     base: BaseParameters, found: Grouping, shares: dict[str, float], motion: tuple[Array, ...]
 ) -> str:
-    """Return a sentence on what the data leave open, and what would help."""
+    """Return a message on combinations that the data do not determine, with advice."""
     names = base.names
     groups = []
     for j in np.flatnonzero(~np.isin(np.arange(len(names)), found.independent)):
-        # Weights of unit columns, so that they compare.
+        # Columns of unit length make the weights comparable.
         weight = np.linalg.lstsq(
             found.scaled[:, found.independent], found.scaled[:, j], rcond=None
         )[0]
@@ -72,11 +72,11 @@ def rank_message(
 
 
 def _advice(base: BaseParameters, shares: dict[str, float], motion: tuple[Array, ...]) -> str:
-    """What to change about the experiment."""
+    """Return advice on how to change the experiment."""
     _, v, a = motion
     names = base.model.robot.joint_names
     advice = []
-    # Only what has a motor can be moved.
+    # The advice names driven joints only, because others cannot be moved.
     driven = base.model.robot.axis_joints
     still = [names[j] for j in driven if np.ptp(v[:, j]) == 0]
     if still:

@@ -1,4 +1,4 @@
-"""The energy (integral) model (4.3): what the motors put in is stored or rubbed away.
+"""The energy (integral) model (4.3): the work of the motors is stored or dissipated.
 
 No accelerations are needed. Over a window from t_a to t_b,
 
@@ -45,7 +45,7 @@ class EnergyRegression:
     """Equations of the energy model, one per window.
 
     matrix
-        Shape (n_windows, n_parameters), parameters of the torque model [J per unit].
+        Shape (n_windows, n_parameters), energy per unit of each parameter of the torque model [J].
     work_j
         Work of the torques over each window, shape (n_windows,) [J].
     start, stop
@@ -64,18 +64,18 @@ class EnergyEstimate:
     """Base parameters from the energy model.
 
     base
-        What the parameters are.
+        Definition of the base parameters.
     values, covariance
         Base parameters (n_base,) and their covariance (n_base, n_base) from the scatter of
         blocks of windows; NaN for parameters with fewer than three degrees of freedom.
     degrees_of_freedom
-        Of that scatter, per parameter; zero where there are as many windows as parameters.
+        Degrees of freedom of that scatter, per parameter; zero with as many windows as parameters.
     residual_rms_j, relative_error
-        Root mean square of the residual [J], and over that of the work.
+        Rms residual [J], and the same relative to the rms work.
     condition_number_scaled
-        Of the regressor with its columns at unit length.
+        Condition number of the regressor with columns of unit length.
     findings
-        What is doubtful about it.
+        Reasons to doubt the estimate.
     """
 
     base: BaseParameters
@@ -89,11 +89,11 @@ class EnergyEstimate:
 
     @property
     def standard_error(self) -> Array:
-        """Standard errors, shape (n_base,); NaN where the windows are too few to tell."""
+        """Standard errors, shape (n_base,), NaN for too few windows."""
         return np.sqrt(np.diag(self.covariance))
 
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return the bounds of the confidence intervals of a ``level``, by Student's distribution."""
+        """Return lower and upper bounds of confidence intervals with probability ``level``, by Student."""
         return student_interval(self.values, self.standard_error, self.degrees_of_freedom, level)
 
 
@@ -105,20 +105,20 @@ def identify_by_energy(
     known: Mapping[str, float] | None = None,
     blocks: int | None = None,
 ) -> EnergyEstimate:
-    """Estimate the base parameters by least squares on the energy model.
+    """Return the least-squares estimate of the base parameters from the energy model.
 
     Parameters
     ----------
-    regression : from :func:`energy_regression`, with the same model.
+    regression : result of :func:`energy_regression` with the same model.
     model : the torque model.
-    base : base parameters found before, with the same known ones.
-    known : parameters and the values to hold them at, by name.
+    base : base parameters with the same known ones; default: computed here.
+    known : values to hold parameters at, by name.
     blocks : number of blocks of consecutive windows for the standard errors; default 30 with
         at least two windows each.
 
-    Warns with IdentificationWarning, as the findings, where the windows are too few for standard
-    errors. Raises InputError for unknown names, IdentifiabilityError where the windows do not
-    determine the parameters.
+    Issues an IdentificationWarning, also among the findings, for too few windows for standard errors.
+    Raises InputError for unknown names, and IdentifiabilityError if the windows do not determine the
+    parameters.
 
     """
     known = numbers("known", known)
@@ -166,9 +166,10 @@ def energy_regressor(model: TorqueModel, q: ArrayLike, v: ArrayLike) -> Array:
 
     ``q`` and ``v`` are joint angles [rad] and velocities [rad/s], (n, n_joints).
 
-    Kinetic and potential energy of the links, kinetic energy of rotors, elastic energy of
-    springs; zero in the columns of friction and offsets, which store nothing. With the
-    parameters of the robot it gives the energy of :meth:`axisight.Robot` up to a constant.
+    The energy is the kinetic and potential energy of links, the kinetic energy of rotors and the
+    elastic energy of springs. Columns of friction and offsets, which store nothing, are zero. With the
+    parameters of the robot it gives the energy of :meth:`axisight.Robot` up to a constant. Raises
+    InputError for wrong shapes.
     """
     q = rows("q", q, model.robot.n_joints)
     v = rows("v", v, model.robot.n_joints)
@@ -198,7 +199,7 @@ def energy_regression(
     window_s: float,
     overlap: float = 0.0,
 ) -> EnergyRegression:
-    """Set up the equations of the energy model over windows of a motion.
+    """Return the equations of the energy model over windows of a motion.
 
     Parameters
     ----------
@@ -206,12 +207,12 @@ def energy_regression(
     q, v : (n, n_joints) uniformly sampled joint angles and velocities [rad, rad/s].
     torque_nm : (n, n_joints) or (n, n_axes) torques [Nm].
     sample_time_s : sample time [s].
-    window_s : length of a window [s]. Longer ones average noise, shorter ones give more equations.
+    window_s : length of a window [s]. Long windows average noise, short windows give more equations.
     overlap : share of a window that the next one repeats, 0 to below 1.
 
-    Work and friction losses are integrated by Simpson's rule. Raises InputError naming the
-    field, also for torque couplings that are not the transpose of the position coupling: what
-    such a gearbox loses depends on the direction of power.
+    Simpson's rule integrates work and friction losses. Raises InputError naming the field, also for
+    torque couplings that are not the transpose of the position coupling, because the losses of such
+    a gearbox depend on the direction of power.
 
     """
     _check_coupling(model)
@@ -233,7 +234,7 @@ def energy_regression(
 
 
 def _speeds(model: TorqueModel) -> Array:
-    """Speeds that the rows' torques work on, as combinations of joints."""
+    """Return the speeds on which the rows' torques do work, as combinations of joints."""
     n = model.robot.n_joints
     if model.side == "joint":
         return np.eye(n)
@@ -241,7 +242,7 @@ def _speeds(model: TorqueModel) -> Array:
 
 
 def _loss_rates(model: TorqueModel, v: Array) -> Array:
-    """Power lost per unit of each parameter."""
+    """Return the power lost per unit of each parameter."""
     out = np.zeros((len(v), model.n_parameters))
     for i, column in enumerate(model.columns):
         if column.extra is None:
@@ -259,7 +260,7 @@ def _loss_rates(model: TorqueModel, v: Array) -> Array:
 
 
 def _integral(rates: Array, sample_time_s: float) -> Array:
-    """Integral from the start, at every sample."""
+    """Return the integral from the start to every sample."""
     if len(rates) < 3:
         out = scipy.integrate.cumulative_trapezoid(rates, dx=sample_time_s, axis=0, initial=0)
     else:

@@ -35,9 +35,9 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 Method = Literal["ls", "wls", "tls"]
 
-# Columns at unit length: below this a singular value is rounding of the data.
+# Smaller singular values are rounding of the data, for columns of unit length.
 DATA_TOLERANCE = 1e-9
-# Default number of blocks: enough for their scatter, few enough to be longer than the
+# Default number of blocks: enough for their scatter, and few enough that blocks are longer than the
 # correlation of residuals.
 BLOCKS = 30
 NOT_NEGATIVE = frozenset(
@@ -70,41 +70,40 @@ def identify_rigid_body(
     blocks: int | None = None,
     threads: int = 0,
 ) -> RigidBodyEstimate:
-    """Estimate the base parameters of a robot from a motion and its torques.
+    """Return estimated base parameters of a robot, from a motion and its torques.
 
     Parameters
     ----------
     robot : the robot, or a :class:`TorqueModel`.
-    q, v, a : (n, n_joints) joint angles, velocities, accelerations [rad, rad/s, rad/s^2], as
+    q, v, a : (n, n_joints) joint angles, velocities, accelerations [rad, rad/s, rad/s^2], for example
         from zero-phase filtering and differentiation. Several logs may follow one another.
     torque_nm : (n, n_joints) joint torques or (n, n_axes) motor torques [Nm], by ``side``.
     terms, side, coupling : see :func:`torque_regressor`.
-    method : ``"ls"``: least squares, all rows alike; ``"wls"``: each row weighted by the
-        standard deviation of its residual, iterated; ``"tls"``: total least squares with the
-        row weights of ``"wls"``, for regressors with errors of their own.
-    base : base parameters found before, with the same known ones; default: found here.
-    known : parameters and the values to hold them at, by name; negative masses, rotors,
-        frictions and springs are refused.
+    method : ``"ls"``: least squares with equal rows. ``"wls"``: weighted least squares, each row by
+        one over the standard deviation of its residual, iterated. ``"tls"``: total least squares with
+        the row weights of ``"wls"``, for regressors with errors.
+    base : base parameters with the same known ones; default: computed here.
+    known : values to hold parameters at, by name. Negative masses, rotors, frictions and springs are
+        refused.
     sample_weight : (n,) or (n, n_rows) weights of the residuals, not negative; zero leaves a
         sample out.
-    column_noise : for ``"tls"``: standard deviation of the error of each base parameter's
-        column over that of the torque, by name [1 per unit of the parameter]; columns not named
-        are exact. Default: errors in proportion to the root mean square of each column,
-        offsets and Coulomb friction exact.
-    eliminate : largest relative standard error to keep, e.g. 0.3; the parameters beyond it
-        are set to zero one by one, the worst first, those of unknown error before all others.
-        Default: none are.
-    deficient : what to do with data that do not separate all base parameters: ``"raise"`` an
+    column_noise : for ``"tls"``: standard deviation of the error of each base parameter's column,
+        relative to that of the torque, by name [1 per unit of the parameter]. Columns not named
+        are exact. Default: errors in proportion to the rms of each column, with exact columns of
+        offsets and Coulomb friction.
+    eliminate : largest relative standard error to keep, e.g. 0.3. Parameters above it are set to zero
+        one by one, those of unknown error first, then the worst. Default: no elimination.
+    deficient : action for data that do not separate all base parameters: ``"raise"`` an
         IdentifiabilityError, or ``"group"`` them further, with a warning.
-    blocks : number of blocks of consecutive samples for the standard errors; they
-        should be longer than residuals are correlated. Default 30, at least 20 samples each.
-    threads : threads to use, 0 for all; the result does not depend on it.
+    blocks : number of blocks of consecutive samples for the standard errors. Blocks should be longer
+        than the correlation of residuals. Default 30, at least 20 samples each.
+    threads : number of threads, 0 for all cores; the result does not depend on it.
 
     Returns
     -------
-    :class:`RigidBodyEstimate`. Memory does not grow with the number of samples beyond that of
-    the arrays given. Warns with IdentificationWarning of what makes the estimate doubtful.
-    Raises InputError for wrong shapes, non-finite values or unknown names,
+    :class:`RigidBodyEstimate`. The function needs no memory in proportion to the number of samples,
+    apart from its arguments. Issues IdentificationWarning for doubts about the estimate.
+    Raises InputError for wrong shapes, non-finite values or unknown names, and
     IdentifiabilityError for data that do not determine the parameters.
 
     """
@@ -168,7 +167,7 @@ def _separated(
     motion: tuple[Array, Array, Array],
     deficient: Literal["raise", "group"],
 ) -> tuple[BaseParameters, Factors, list[IdentificationFinding]]:
-    """Return what the data separate: the base parameters, or, if that is wanted, fewer."""
+    """Return the base parameters that the data separate; with ``"group"`` they may be fewer."""
     shares = reversals(base.model, base.columns, motion[1])
     findings = reversal_findings(shares)
     found = group(factors.rows.reshape(-1, factors.k + 1)[:, :-1], DATA_TOLERANCE)
@@ -200,9 +199,10 @@ def regrouped(base: BaseParameters, independent: NDArray[np.intp], matrix: Array
 def _eliminated(
     factors: Factors, method: Method, floor: Array, noise: Array | None, limit: float | None
 ) -> tuple[NDArray[np.intp], Factors, Solution, tuple[Array, Array]]:
-    """Solve without the least certain parameter until all that are left are certain enough.
+    """Return the solution after eliminating the least certain parameters, one by one.
 
-    Returns what was kept, its factors, its solution, covariance and degrees of freedom.
+    The result is: indices of the kept parameters, their factors, their solution, and a pair of
+    covariance and degrees of freedom.
     """
     keep = np.arange(factors.k)
     while True:
@@ -231,13 +231,13 @@ def _solve(factors: Factors, method: Method, floor: Array, noise: Array | None) 
 
 
 def _least_certain(solution: Solution, covariance: Array, limit: float | None) -> int | None:
-    """Index of the parameter to eliminate next, if any."""
+    """Return the index of the parameter to eliminate next, None without one."""
     if limit is None or len(solution.values) < 2:
         return None
     error = np.sqrt(np.diag(covariance))
-    # Written without a division: a value of zero is as uncertain as can be.
+    # The floor avoids a division by zero: a value of zero is the most uncertain.
     excess = error / np.maximum(np.abs(solution.values), 1e-300)
-    # Nothing is as uncertain as what shows no scatter.
+    # A parameter without known scatter is the most uncertain.
     excess[np.isnan(excess)] = np.inf
     worst = int(np.argmax(excess))
     return worst if excess[worst] > limit else None
@@ -246,7 +246,7 @@ def _least_certain(solution: Solution, covariance: Array, limit: float | None) -
 def known_base(
     model: TorqueModel, base: BaseParameters | None, known: Mapping[str, float]
 ) -> BaseParameters:
-    """Return the base parameters given, after a check that they fit, or find them."""
+    """Return ``base`` after a check that it fits the model and ``known``, or compute it."""
     if base is None:
         return base_parameters(model, known=known)
     if base.model.names != model.names or base.model.side != model.side:
@@ -296,7 +296,7 @@ def _factors(
 def _column_noise(
     base: BaseParameters, given: Mapping[str, float] | None, factors: Factors, torque: Array
 ) -> Array:
-    """Error of each column over that of the torque."""
+    """Return the error of each column, relative to that of the torque."""
     if given is not None:
         given = numbers("column_noise", given)
         unknown = set(given) - set(base.names)
@@ -313,7 +313,7 @@ def _column_noise(
         extra = base.model.columns[column].extra
         if extra is not None and extra[0] in ("direction", "constant"):
             noise[i] = 0.0
-    # Errors per unit of the parameter: a column twice as large has errors twice as large.
+    # Errors are per unit of the parameter, so a column twice as large has errors twice as large.
     return np.asarray(noise, dtype=np.float64)
 
 
@@ -331,7 +331,7 @@ def numbers(field: str, values: Mapping[str, float] | None) -> dict[str, float]:
 
 
 def known_values(values: Mapping[str, float] | None) -> dict[str, float]:
-    """Return known parameters as finite floats; refuse what no body, rotor or spring has."""
+    """Return known parameters as finite floats; raises InputError for negative masses, rotors, springs."""
     known = numbers("known", values)
     for name, value in known.items():
         if value < 0 and name.rpartition(".")[2] in NOT_NEGATIVE:
@@ -353,7 +353,7 @@ def row_weights(value: ArrayLike | None, shape: tuple[int, int]) -> Array | None
 
 
 def default_blocks(blocks: int | None, n: int, least: int = 20) -> int:
-    """Return the number of blocks asked for, or the default, of ``least`` samples or more each."""
+    """Return ``blocks`` or the default, with blocks of at least ``least`` samples."""
     if blocks is None:
         return max(2, min(BLOCKS, n // least)) if n > 1 else 1
     if isinstance(blocks, bool) or not isinstance(blocks, (int, np.integer)):

@@ -1,4 +1,4 @@
-"""What a regression says about its data, as data."""
+"""Findings of a regression about its data."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ from axisight.display.summary import summarized
 
 
 class FindingKind(StrEnum):
-    """What a finding is about."""
+    """The subject of a finding."""
 
     RANK = "rank"
     """The data do not separate all base parameters; some were grouped further."""
     CONDITION = "condition"
     """The regression is badly conditioned: small errors of the data become large ones."""
     REVERSAL = "reversal"
-    """An axis hardly ever reverses: its Coulomb friction rests on little or nothing."""
+    """An axis hardly ever reverses, so its Coulomb friction is poorly known or unknown."""
     LEFT_OUT = "left_out"
-    """Samples around reversals were left out; serious if it was less than intervals need."""
+    """Samples around reversals were left out; serious if they were fewer than intervals need."""
     FEW_SAMPLES = "few_samples"
-    """An axis has few samples for its parameters: its residual comes out too small."""
+    """An axis has few samples for its parameters, so its residual is too small."""
     BENDING = "bending"
-    """Springs of the robot file give way to the motion: arm inertias come out too large."""
+    """Springs of the robot file bend under the motion, so arm inertias are too large."""
     MISFIT = "misfit"
-    """A log is not explained, or far worse than another."""
+    """The parameters do not explain a log, or explain it far worse than another."""
     GEAR_SIGN = "gear_sign"
-    """An axis by itself wants a negative inertia: gear ratio or torque have the wrong sign."""
+    """The fit of an axis alone has a negative inertia: gear ratio or torque have the wrong sign."""
     NEGATIVE_FRICTION = "negative_friction"
-    """Friction that drives."""
+    """A friction coefficient is negative."""
     WEIGHTS = "weights"
-    """Row weights did not settle."""
+    """Row weights did not converge."""
     FREEDOM = "freedom"
     """Standard errors rest on too few blocks or equations."""
     ELIMINATED = "eliminated"
@@ -45,11 +45,11 @@ class IdentificationFinding:
     kind
         See :class:`FindingKind`.
     message
-        What was seen, with figures, and what to do about it.
+        The observation, with figures, and advice.
     serious
-        True if the estimate is not to be trusted without a look at it.
+        Whether to check the finding before trusting the estimate.
     names
-        Parameters or rows concerned.
+        Affected parameters or rows.
     """
 
     kind: FindingKind
@@ -58,5 +58,5 @@ class IdentificationFinding:
     names: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        """One line for a person."""
+        """Return the finding as one line."""
         return self.message

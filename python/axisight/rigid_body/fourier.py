@@ -25,7 +25,7 @@ class FourierTrajectory:
     """Angles of the driven joints as finite Fourier series, joint side.
 
     With w = 2 pi ``fundamental_hz``, ``q = centre + sum_l (sine_l sin(l w t) - cosine_l
-    cos(l w t)) / (l w)``: ``sine`` and ``cosine``, both (n_axes, n_harmonics), are amplitudes of
+    cos(l w t)) / (l w)``. ``sine`` and ``cosine``, both (n_axes, n_harmonics), are amplitudes of
     velocity [rad/s]; ``centre_rad`` is (n_axes,).
     """
 
@@ -46,7 +46,7 @@ class FourierTrajectory:
 
     @property
     def n_harmonics(self) -> int:
-        """Harmonics of every axis."""
+        """Number of harmonics of every axis."""
         return int(self.sine.shape[1])
 
     def motion(self, time_s: ArrayLike) -> tuple[Array, Array, Array]:
@@ -65,9 +65,9 @@ class FourierTrajectory:
     ) -> References:
         """Return one period of motor velocity references at the robot's sample time.
 
-        ``coupling`` are the gears, by default those of the robot; ``design`` is kept with the
-        coefficients and with ``start_rad``, the joint angles at t = 0. Raises InputError if the
-        period is not a whole number of samples.
+        ``coupling`` are the gears, by default those of the robot. The references keep ``design``
+        together with the coefficients and ``start_rad``, the joint angles at t = 0. Raises InputError
+        for another number of axes, and if the period is not a whole number of samples.
         """
         if robot.n_axes != self.n_axes:
             raise InputError(f"robot: expected {self.n_axes} axes, got {robot.n_axes}")
@@ -93,15 +93,16 @@ class FourierTrajectory:
     def write(
         self, path: Path | str, robot: Robot, *, design: dict[str, Any] | None = None
     ) -> list[Path]:
-        """Write the references of ``robot`` to ``path`` (.csv, .mat, .parquet), with ``design``.
+        """Write the references of ``robot`` with ``design`` to ``path``, and return the files written.
 
-        The files are those of :func:`axisight.excitation.write_references`.
+        Formats (.csv, .mat, .parquet) and errors are those of
+        :func:`axisight.excitation.write_references`.
         """
         return write_references(self.references(robot, design=design), path)
 
 
 def series(fundamental_hz: float, harmonics: int, time_s: Array) -> tuple[Array, Array, Array]:
-    """Matrices (n, 2 h) from velocity amplitudes (sine, then cosine) to q, v, a."""
+    """Return the matrices (n, 2 h) from velocity amplitudes (sine, then cosine) to q, v, a."""
     w = 2.0 * np.pi * fundamental_hz * np.arange(1, harmonics + 1)
     s, c = np.sin(time_s[:, None] * w), np.cos(time_s[:, None] * w)
     return np.hstack([s / w, -c / w]), np.hstack([c, s]), np.hstack([-w * s, w * c])

@@ -1,4 +1,4 @@
-"""Terms of the torque beside the links': rotors, friction, offsets, springs."""
+"""Terms of the torque other than links: rotors, friction, offsets, springs."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ KINDS = (
 
 @dataclass(frozen=True)
 class DriveTerms:
-    """Which parameters every driven axis has beside those of its link.
+    """Parameters of every driven axis other than those of its link.
 
     Each of the four kinds is ``None`` (absent), ``"motor"``, ``"joint"`` or both as a tuple.
-    On the motor side the motor's angle, speed and acceleration count, and the torque acts on
-    the motor; on the joint side the joint's. The two are equivalent for an axis with a gear of
-    its own, and differ where motors are coupled (see :class:`MotorCoupling`): a motor that two
-    joints turn rubs when either does.
+    A motor-side term depends on the motor's speed or acceleration, and its torque acts on the motor.
+    A joint-side term belongs to the joint in the same way. Both are equivalent for an axis with its
+    own gear. They differ if motors are coupled (see :class:`MotorCoupling`): a motor that two joints
+    turn has friction when either joint turns.
 
     inertia
         Rotor: ``motor_inertia`` [kg m^2], motor side, or ``joint_rotor_inertia``, joint side
@@ -47,8 +47,8 @@ class DriveTerms:
     smoothing_rad_s
         Replaces the sign by ``tanh(speed / smoothing)``; zero is the sign itself.
     springs
-        Stiffness and damping of every elastic joint as parameters too. Without, elastic
-        joints have rows for the torque that their springs must give.
+        Whether stiffness and damping of every elastic joint are parameters too. Without them, the
+        rows of elastic joints are the torques of their springs.
 
     Raises InputError naming the field.
     """
@@ -71,7 +71,7 @@ class DriveTerms:
                 raise InputError(f"{field}: expected a number not below zero, got {value!r}")
 
     def sides(self, kind: str) -> tuple[Side, ...]:
-        """Sides on which a kind of term stands, motor side first."""
+        """Return the sides of a kind of term, motor side first."""
         given = getattr(self, kind)
         sides = () if given is None else (given,) if isinstance(given, str) else tuple(given)
         if any(side not in ("motor", "joint") for side in sides) or len(set(sides)) < len(sides):
@@ -81,7 +81,7 @@ class DriveTerms:
         return tuple(side for side in ("motor", "joint") if side in sides)
 
     def settings(self, kind: str) -> tuple[float, float]:
-        """Dead band and smoothing of a kind, zero where they have no place."""
+        """Return dead band and smoothing of a kind of term, zero for kinds without them."""
         if kind == "coulomb":
             return float(self.dead_band_rad_s), float(self.smoothing_rad_s)
         return 0.0, 0.0

@@ -45,21 +45,21 @@ Motion = tuple[Array, Array, Array, Array]
 @summarized
 @dataclass(frozen=True, eq=False)
 class LogIdentification:
-    """What :func:`identify_logs` found.
+    """Result of :func:`identify_logs`.
 
     estimate
         Base parameters with standard errors.
     consistent
-        Parameters of bodies that can exist; None if they were not asked for.
+        Parameters of bodies that can exist; None if not requested.
     motions
-        Of the logs fitted: band, decimation, dropped samples.
+        Filtered motions of the fitted logs: band, decimation, dropped samples.
     errors
-        ``rms_nm`` [Nm] and ``relative_error`` (rms over that of the torque) over
-        (parameters: ``estimate`` and, where asked for, ``consistent``; log; axis, from 1). The
-        coordinate ``held_out`` (log) tells which logs took no part.
+        ``rms_nm`` [Nm] and ``relative_error`` (relative to the rms torque) over (parameters:
+        ``estimate`` and, if requested, ``consistent``; log; axis, from 1). The coordinate
+        ``held_out`` (log) tells which logs took no part in the fit.
     samples_kept
-        Filtered samples of each axis (n_axes,) that were fitted; the rest lie around reversals.
-        Residuals of ``estimate`` are over these, ``errors`` over all.
+        Number of fitted samples of each axis (n_axes,), after filtering; the others lie around
+        reversals. Residuals of ``estimate`` are over fitted samples, ``errors`` over all samples.
     """
 
     estimate: RigidBodyEstimate
@@ -69,7 +69,7 @@ class LogIdentification:
     samples_kept: NDArray[np.intp]
 
     def _repr_html_(self) -> str:
-        """Base parameters and torque errors on every log, for notebooks."""
+        """Return base parameters and torque errors on every log, for notebooks."""
         rows = []
         for which in self.errors["parameters"].values:
             one = self.errors.sel(parameters=which)
@@ -83,16 +83,19 @@ class LogIdentification:
         )
 
     def identified(self, provenance: Provenance) -> Identified:
-        """Return the values for a robot file, those of bodies that can exist where there are.
+        """Return the values for a robot file, those of ``consistent`` if available.
 
-        What the motions do not show keeps the value it has in the file and is left out; what they
-        show only in combinations is split by the values in the file, without standard errors, and
-        noted. Motor-side parameters that stand for themselves have standard errors (not with
-        ``consistent``, which mixes in a prior), values that were given have zero and are noted; of
-        links only combinations have: the table of base parameters is in the settings of
-        ``provenance``, torque errors with it, findings in the notes. Effects that the values have
-        taken up are removed (:func:`identified_bodies`). Raises RobotError for masses no body has,
-        which the estimate alone may lead to.
+        - Parameters that the motions do not show keep their value in the file and are left out.
+        - Combinations are split by the values in the file, without standard errors; a note says so.
+        - Drive parameters that are identifiable alone have standard errors, but not with
+          ``consistent``, which mixes in a prior.
+        - Known values have standard error zero and a note.
+        - Link parameters have no standard errors, because only combinations have them. The settings of
+          ``provenance`` hold the table of base parameters and the torque errors; the notes hold the
+          findings.
+        - Effects that the values include are removed (:func:`identified_bodies`).
+
+        Raises RobotError for masses that no body has, which ``estimate`` alone can give.
         """
         model = self.estimate.model
         theta = self.estimate.standard() if self.consistent is None else self.consistent.theta
@@ -115,7 +118,7 @@ class LogIdentification:
         settings["torque_error"] = self._error_table()
         source = noted(replace(provenance, settings=settings), notes)
         held = self.estimate.known
-        # What is made of given values alone has no variance.
+        # Values computed from known ones alone have no variance.
         free = np.diag([float(name not in held) for name in model.names])
         corner = _corners(model, self.motions)
         found = identified_bodies(model, theta, source, covariance=free, corner_rad_s=corner)
@@ -139,7 +142,7 @@ class LogIdentification:
         )
 
     def _lone_errors(self) -> Array:
-        """Standard errors (n_parameters,) of drive parameters that stand for themselves, else NaN."""
+        """Return standard errors (n_parameters,) of drive parameters identifiable alone, NaN for others."""
         estimate, model = self.estimate, self.estimate.model
         out = np.full(model.n_parameters, np.nan)
         if self.consistent is not None:
@@ -157,7 +160,7 @@ class LogIdentification:
         return out
 
     def _undetermined(self) -> list[str]:
-        """Return a note on what shows only in combinations, by name where a drive is part of one."""
+        """Return a note on parameters that show only in combinations, naming those of drives."""
         base = self.estimate.base
         mixed = [
             (text, any(base.model.columns[i].extra is not None for i in np.flatnonzero(row)))
@@ -221,34 +224,35 @@ def identify_logs(
     consistent: bool = False,
     prior_share: float = 1.0,
 ) -> LogIdentification:
-    """Identify masses, inertias and friction from motor logs; gears count as rigid.
+    """Return masses, inertias and friction identified from motor logs, with rigid gears.
 
-    Every log goes through :func:`estimate_motion`, motor angles become joint angles by the gears,
-    :func:`identify_rigid_body` regresses all logs together, on the motor side.
+    :func:`estimate_motion` filters every log, and the gears convert motor angles to joint angles.
+    Then :func:`identify_rigid_body` regresses all logs together, on the motor side.
 
     Parameters
     ----------
-    robot : chain and gears; its masses and inertias where the motions do not tell.
-        Elastic joints are taken at angle zero.
-    logs, held_out : to fit to, and to judge by only.
-    cutoff_hz : of the filter [Hz], well above the motion and well below the first resonance.
-    reversal_s : how long before and after a motor turns back its torque is left out of the fit [s].
-        The filter smears the step of Coulomb friction there, and the regressor has it sharp; default
-        two periods of the cutoff, or less, with a warning, on axes where that would leave less
-        than a fifth of the samples; 0 for none.
-    torque_held : torques are commands u_k that hold from sample k to the next, as in the conventions:
-        at sample k acts the mean of u_(k-1) and u_k, or friction were off by half a sample, a
-        viscous one by -J w^2 T / 2. False for torques measured at the samples.
-    terms : of the drives, see :class:`DriveTerms`.
-    coupling : of the motors; default the gear ratios of the robot.
+    robot : chain and gears. Its masses and inertias complete what the motions do not show. Elastic
+        joints stay at angle zero.
+    logs, held_out : logs to fit, and logs that only measure torque errors.
+    cutoff_hz : cutoff of the filter [Hz], well above the motion and well below the first resonance.
+    reversal_s : time before and after a reversal of a motor in which the fit leaves out its torque [s].
+        There the filter smears the step of Coulomb friction, which is sharp in the regressor. By
+        default two periods of the cutoff, or less, with a warning, on axes with less than a fifth of
+        the samples left; 0 for none.
+    torque_held : whether torques are commands u_k that hold from sample k to the next, as in the
+        conventions. The torque at sample k is then the mean of u_(k-1) and u_k. Without this mean
+        friction would be wrong by half a sample, viscous friction by -J w^2 T / 2. False for torques
+        measured at the samples.
+    terms : terms of the drives, see :class:`DriveTerms`.
+    coupling : gears between motors and joints; default the gear ratios of the robot.
     method, known, eliminate, deficient : as for :func:`identify_rigid_body`.
-    consistent : also find bodies that can exist (:func:`identify_consistent`), with the values
-        of the robot as a prior; what is ``known`` is held there too, ``eliminate`` is refused.
+    consistent : whether to find also bodies that can exist (:func:`identify_consistent`), with the
+        values of the robot as a prior and ``known`` values held. It excludes ``eliminate``.
     prior_share : standard deviation of that prior as a share of each link's size, see
         :func:`prior_spread`.
 
-    Warns with IdentificationWarning of what makes the estimate doubtful. Raises InputError
-    naming the log or option, IdentifiabilityError for motions that do not determine the parameters.
+    Issues IdentificationWarning for doubts about the estimate. Raises InputError naming the log or
+    option, and IdentifiabilityError for motions that do not determine the parameters.
 
     """
     given = [logs] if isinstance(logs, Log) else list(logs)
@@ -314,7 +318,7 @@ def identify_logs(
 
 
 def _corners(model: TorqueModel, motions: Sequence[MotionEstimate]) -> Array:
-    """Return over which motor speeds (n_axes,) dry friction turns over, as the motions have it."""
+    """Return the motor speeds (n_axes,) [rad/s] over which to smooth dry friction, from the motions."""
     chosen = float(model.terms.smoothing_rad_s)
     top = np.max([np.abs(m.velocity_rad_s).max(axis=0) for m in motions], axis=0)
     return np.full(len(top), chosen) if chosen > 0 else friction_corner(top)
@@ -327,7 +331,7 @@ def _estimate(log: Log, robot: Robot, cutoff_hz: float, torque_held: bool) -> Mo
         raise InputError(f"{log.name}: expected {robot.n_axes} axes, got {log.n_axes}")
     torque = log.torque_nm
     if torque_held:
-        # Of the sample before the first nothing is known; the filter drops it anyway.
+        # The command before the first is unknown, but the filter drops that sample anyway.
         torque = np.concatenate([torque[:1], 0.5 * (torque[1:] + torque[:-1])])
     try:
         return estimate_motion(
@@ -338,7 +342,7 @@ def _estimate(log: Log, robot: Robot, cutoff_hz: float, torque_held: bool) -> Mo
 
 
 def _joint_motion(model: TorqueModel, motion: MotionEstimate) -> Motion:
-    """Motion of all joints and motor torques; elastic joints stand still at zero."""
+    """Return the motion of all joints and the motor torques, with elastic joints at zero."""
     parts = []
     for motor in (motion.position_rad, motion.velocity_rad_s, motion.acceleration_rad_s2):
         full = np.zeros((motion.n_samples, model.robot.n_joints))
@@ -356,7 +360,7 @@ def _errors(
     names: Sequence[str],
     fitted: int,
 ) -> xr.Dataset:
-    """Torque errors by log and axis, where the axis moves; NaN where it never does."""
+    """Return torque errors by log and axis, over samples where the axis moves; NaN if it never does."""
     shape = (len(thetas), len(motions), model.n_rows)
     rms, relative = np.empty(shape), np.full(shape, np.nan)
     for i, (q, v, a, torque) in enumerate(motions):

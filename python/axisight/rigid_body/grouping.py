@@ -12,16 +12,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Grouping:
-    """A basis of columns and what depends on it.
+    """A basis of the columns of a matrix A, and the other columns in terms of it.
 
     independent
-        Columns that stand for the rest, increasing.
+        Indices of the columns of the basis, increasing.
     matrix
         Shape (rank, n): ``A x = A[:, independent] (matrix @ x)``.
     scaled
-        The matrix with its columns at unit length, silent ones zero.
+        A with columns of unit length; skipped and zero columns are zero.
     singular_values, rank, gap
-        Of the scaled matrix.
+        Those of the scaled matrix.
     """
 
     independent: NDArray[np.intp]
@@ -33,10 +33,9 @@ class Grouping:
 
 
 def group(a: Array, tolerance: float, skip: NDArray[np.bool_] | None = None) -> Grouping:
-    """Group the columns of ``a``, from left to right.
+    """Return the columns of ``a`` grouped from left to right.
 
-    ``tolerance`` is relative, on columns at unit length; columns marked by ``skip`` count
-    as zero, as do those that are zero.
+    ``tolerance`` is relative, for columns of unit length. Columns marked by ``skip`` count as zero.
     """
     size = np.linalg.norm(a, axis=0)
     used = size > 0
@@ -50,7 +49,7 @@ def group(a: Array, tolerance: float, skip: NDArray[np.bool_] | None = None) -> 
     independent = _basis(scaled, used, tolerance)
     basis = scaled[:, independent]
     weights = np.linalg.lstsq(basis, scaled, rcond=None)[0] if len(independent) else basis.T
-    # A coefficient this small is rounding of the decomposition.
+    # Smaller coefficients are rounding errors of the decomposition.
     weights[np.abs(weights) < 1e-9] = 0.0
     weights[:, independent] = np.eye(len(independent))
     matrix = weights * np.where(used, size, 0.0) / size[independent][:, None]
@@ -59,11 +58,11 @@ def group(a: Array, tolerance: float, skip: NDArray[np.bool_] | None = None) -> 
 
 
 def _basis(scaled: Array, used: NDArray[np.bool_], tolerance: float) -> NDArray[np.intp]:
-    """Columns that no earlier ones give, by Gram-Schmidt, twice for orthogonality."""
+    """Return the columns independent of earlier ones, by Gram-Schmidt, repeated for orthogonality."""
     basis = np.zeros((len(scaled), 0))
     found = []
-    # What is left of a dependent column is rounding, amplified by how nearly dependent the
-    # basis is already; of an independent one it is about the smallest singular value.
+    # The remainder of a dependent column is rounding, amplified if the basis is nearly dependent. The
+    # remainder of an independent column is about the smallest singular value.
     for i in np.flatnonzero(used):
         rest = scaled[:, i]
         for _ in range(2):

@@ -1,7 +1,7 @@
 """Linear regression from triangular factors, one per block of samples and row.
 
-Everything here works on the factors of ``[Phi | tau]`` (:func:`axisight._core.regression_factors`)
-and costs the same for a thousand samples or a billion.
+All functions work on the factors of ``[Phi | tau]`` (:func:`axisight._core.regression_factors`), so
+that their cost does not depend on the number of samples.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """Triangular factors.
+    """Triangular factors of a regression.
 
     blocks
         Shape (n_blocks, n_rows, k + 1, k + 1); the last column is the torque.
     counts
-        Samples behind each row, shape (n_rows,).
+        Number of samples of each row, shape (n_rows,).
     """
 
     blocks: Array
@@ -56,7 +56,7 @@ class Factors:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A regression.
+    """The solution of a regression.
 
     values
         Parameters, shape (k,).
@@ -69,10 +69,10 @@ class Solution:
     loss
         Sum of squared residuals of each row [Nm^2].
     iterations, converged
-        Of the row weights.
+        Iterations of the row weights, and whether they converged.
     noise
-        Standard deviation of the error of each column over that of the torque (total least
-        squares), else zero.
+        Standard deviation of the error of each column relative to that of the torque, for total least
+        squares; else zero.
     """
 
     values: Array
@@ -86,7 +86,7 @@ class Solution:
 
 
 def triangle(stack: Array) -> Array:
-    """Triangular factor with as many rows as columns, zero rows filled in."""
+    """Return the square triangular factor, filled with zero rows if needed."""
     n = stack.shape[-1]
     out: Array = np.asarray(np.linalg.qr(stack, mode="r"), dtype=np.float64)
     missing = n - out.shape[-2]
@@ -97,13 +97,13 @@ def triangle(stack: Array) -> Array:
 
 
 def solve_weighted(factors: Factors, weight: Array) -> Solution:
-    """Least squares with a weight per row (4.5)."""
+    """Return the least-squares solution with a weight per row, (4.5)."""
     k, rows = factors.k, factors.rows
     r = triangle((weight[:, None, None] * rows).reshape(-1, k + 1))
     values = _back(r[:k, :k], r[:k, k])
     residual = rows[..., :k] @ values - rows[..., k]
     loss = (residual**2).sum(axis=-1)
-    # What the fit takes off the degrees of freedom of each row.
+    # The degrees of freedom of each row that the fit uses.
     hat = weight[:, None, None] * _right_divide(rows[..., :k], r[:k, :k])
     free = np.maximum(factors.counts - (hat**2).sum(axis=(1, 2)), 1.0)
     return Solution(
@@ -119,9 +119,9 @@ def solve_weighted(factors: Factors, weight: Array) -> Solution:
 
 
 def solve_reweighted(factors: Factors, floor: Array, iterations: int = 50) -> Solution:
-    """Least squares with each row weighted by its own residual, iterated until that stands.
+    """Return the solution with each row weighted by its own residual, iterated until weights settle.
 
-    ``floor`` [Nm] keeps a row that fits to rounding from taking all the weight.
+    ``floor`` [Nm] limits the weight of a row with residuals at rounding level.
     """
     solution = solve_weighted(factors, np.ones(len(factors.counts)))
     for iteration in range(2, iterations + 1):
@@ -139,11 +139,11 @@ def _counted(solution: Solution, iterations: int, converged: bool) -> Solution:
 
 
 def solve_total(factors: Factors, start: Solution, noise: Array) -> Solution | None:
-    """Total least squares: errors in the regressor too (Golub and Van Loan 1980).
+    """Return the total least-squares solution, for errors in the regressor too, or None without one.
 
-    ``noise`` holds the standard deviation of each column's error over the torque's, zero
-    for columns without error (mixed problem, Van Huffel and Vandewalle 1991). Rows are
-    weighted as in ``start``. None if no solution exists.
+    Golub and Van Loan (1980). ``noise`` holds the standard deviation of each column's error relative
+    to that of the torque, zero for columns without error (mixed problem, Van Huffel and Vandewalle
+    1991). Row weights are those of ``start``.
     """
     k, rows, weight = factors.k, factors.rows, start.weight
     noisy = noise > 0
@@ -180,7 +180,7 @@ def solve_total(factors: Factors, start: Solution, noise: Array) -> Solution | N
 
 
 def white_covariance(factors: Factors, solution: Solution) -> Array:
-    """Covariance for residuals that are white, of each row its own variance."""
+    """Return the covariance for white residuals, with a separate variance for each row."""
     k = factors.k
     scaled = (solution.weight**2 * solution.sigma)[:, None, None] * factors.rows[..., :k]
     root = _right_divide(scaled.reshape(-1, k), solution.normal)
@@ -190,11 +190,12 @@ def white_covariance(factors: Factors, solution: Solution) -> Array:
 
 
 def block_covariance(factors: Factors, solution: Solution) -> tuple[Array, Array]:
-    """Covariance from the scatter of the blocks, and degrees of freedom per parameter.
+    """Return the covariance from the scatter of the blocks, and degrees of freedom per parameter.
 
-    See :class:`axisight.statistics.cluster_scatter.ClusterScatter`: for residuals that are
-    correlated in time within blocks and between rows. Parameters whose scatter does not show, for
-    there are as many equations as parameters or one block decides them alone, have NaN and none.
+    It allows for residuals that are correlated within blocks and between rows, see
+    :class:`axisight.statistics.cluster_scatter.ClusterScatter`. If there are as many equations as
+    parameters, or one block alone decides a parameter, its scatter is unknown: the covariance is NaN
+    and the degrees of freedom are zero.
     """
     k, weight = factors.k, solution.weight
     n_blocks = len(factors.blocks)
@@ -211,7 +212,7 @@ def block_covariance(factors: Factors, solution: Solution) -> tuple[Array, Array
 
 
 def _error_in_columns(solution: Solution, residual: Array) -> Array:
-    """What errors in the columns put into the scores of total least squares."""
+    """Return the contribution of errors in the columns to the scores of total least squares."""
     spread = 1.0 + solution.noise**2 @ solution.values**2
     loss = (residual**2).sum(axis=1)
     pull = solution.noise**2 * solution.values / spread
@@ -219,14 +220,14 @@ def _error_in_columns(solution: Solution, residual: Array) -> Array:
 
 
 def _back(r: Array, right: Array) -> Array:
-    """Solve with an upper triangular matrix."""
+    """Return ``r^-1 right`` for an upper triangular r."""
     if len(r) == 0:
         return np.zeros_like(right)
     return np.asarray(scipy.linalg.solve_triangular(r, right), dtype=np.float64)
 
 
 def _right_divide(a: Array, r: Array) -> Array:
-    """``a r^-1`` for an upper triangular r."""
+    """Return ``a r^-1`` for an upper triangular r."""
     flat = a.reshape(-1, a.shape[-1])
     out = scipy.linalg.solve_triangular(r, flat.T, trans="T").T
     return np.asarray(out.reshape(a.shape), dtype=np.float64)

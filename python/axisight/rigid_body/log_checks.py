@@ -1,4 +1,4 @@
-"""Checks of logs against each other and of what was fitted to them."""
+"""Checks of logs against each other, and of fits to them."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from axisight.rigid_body.findings import FindingKind, IdentificationFinding
 Array = NDArray[np.float64]
 
 LEAST_PER_PARAMETER = 5.0
-"""Samples of an axis per parameter below which a fit is refused. The filter leaves some two
-independent numbers of four samples: with fewer an axis may be fitted all but exactly, and
-weights by residuals then follow it alone."""
+"""Least number of samples of an axis per parameter; with fewer a fit is refused. The filter leaves about
+two independent numbers of four samples. With fewer samples the fit of an axis could be nearly exact, and
+weights from residuals would then follow that axis alone."""
 USUAL_PER_PARAMETER = 10.0
-"""Samples per parameter below which residuals come out clearly too small."""
+"""With fewer samples per parameter, residuals are clearly too small."""
 MISFIT = 0.45
-"""Relative torque error that says that the model is not one of the log."""
+"""Relative torque error above which the model does not explain a log."""
 DISAGREEMENT = 10.0
-"""Factor between torque errors of two logs that noise does not explain,"""
+"""Ratio between the torque errors of two logs that noise does not explain."""
 DISAGREEMENT_LEAST = 0.05
-"""unless the larger is below this."""
+"""Torque error below which that ratio does not count."""
 
 _REASONS = (
     "check units, signs, the side of the gear and the order of its columns, and whether it is a "
@@ -35,7 +35,7 @@ _REASONS = (
 
 
 def refuse_repeated(logs: Sequence[Log], held_out: Sequence[Log]) -> None:
-    """Raise InputError for a log given twice, whatever its name: it tells nothing new."""
+    """Raise InputError for a log given twice under any name, because the second adds no information."""
     given = [*logs, *held_out]
     for i, log in enumerate(given):
         for other in given[:i]:
@@ -61,10 +61,10 @@ def _same(log: Log, other: Log) -> bool:
 def few_samples(
     base: BaseParameters, motion: tuple[Array, Array, Array], weight: Array
 ) -> list[IdentificationFinding]:
-    """Return a finding if an axis has few samples for its parameters; refuse far too few.
+    """Return a finding if an axis has few samples for its parameters; raises InputError for far too few.
 
-    ``motion`` are q, v, a (n, n_joints), ``weight`` (n, n_axes) is zero for samples left out. A
-    parameter that shows on several axes counts for each as a part.
+    ``motion`` are q, v, a (n, n_joints), and ``weight`` (n, n_axes) is zero for samples left out. A
+    parameter that shows on several axes counts as a fraction on each.
     """
     thinned = (x[:: max(1, len(x) // 200)] for x in motion)
     size = np.abs(base.regressor(*thinned)).max(axis=0)
@@ -91,7 +91,7 @@ def few_samples(
 def misfit(errors: xr.Dataset) -> list[IdentificationFinding]:
     """Return findings for logs that the parameters do not explain, or explain far worse than others.
 
-    ``errors`` is that of :class:`LogIdentification`; the last of its parameters count.
+    ``errors`` is that of :class:`LogIdentification`; the check uses its last set of parameters.
     """
     relative = np.nan_to_num(errors["relative_error"].isel(parameters=-1).values)
     logs = [

@@ -1,8 +1,7 @@
 """Velocity, acceleration and filtered torque from logged positions, without phase shift.
 
-Rigid-body identification is done off-line, so that acausal filters and central differences are
-at hand (Wernholt 2004, section 4.3). What they cost is amplitude, towards the edge of a band that
-the result names.
+Rigid-body identification is off-line, so acausal filters and central differences are possible
+(Wernholt 2004, section 4.3). They reduce amplitudes towards the edge of a band that the result names.
 """
 
 from __future__ import annotations
@@ -23,9 +22,9 @@ Array = NDArray[np.float64]
 Method = Literal["butterworth", "fourier"]
 
 _TRANSIENT = 1e-3
-"""What may remain of a transient that starts at the ends of the record."""
+"""Share to which a transient from the ends of the record must fall."""
 _JUMP = 4.0
-"""A step from the last sample to the first this many times the largest inside is no period."""
+"""Largest step from the last sample to the first in a period, relative to the largest step inside."""
 
 
 @summarized
@@ -33,33 +32,33 @@ _JUMP = 4.0
 class MotionEstimate:
     """A motion without its noise, ready for a regression.
 
-    Arrays are (n_samples, n_axes), of the side (motor or joint) that was given; on a prismatic
+    Arrays are (n_samples, n_axes), on the side (motor or joint) of the record; on a prismatic
     axis rad reads m and Nm reads N.
 
     time_s
-        (n_samples,), of the record: what was dropped at its start counts.
+        (n_samples,), time since the start of the record, including dropped samples.
     position_rad, velocity_rad_s, acceleration_rad_s2
         Filtered position and its derivatives.
     torque_nm
         The torque through the same filter; None without torque.
     sample_time_s
-        After decimation.
+        Sample time after decimation.
     band_hz
-        Where position, velocity and acceleration are within ``amplitude_error`` of the true
-        amplitudes; nothing is shifted in phase.
+        Band in which position, velocity and acceleration are within ``amplitude_error`` of the true
+        amplitudes; there is no phase shift.
     amplitude_error
         Largest relative error of an amplitude in the band.
     cutoff_hz
-        Where the filter has half its gain (``"butterworth"``) or ends (``"fourier"``).
+        Frequency at which the filter has half its gain (``"butterworth"``) or ends (``"fourier"``).
     decimation
-        Every how many samples one was kept.
+        Factor of decimation: one of this many samples was kept.
     dropped
         Samples of the record left out at its start and end, where the filter settles.
     n_periods
-        Periods averaged (``"fourier"``); 0 for a record that was not taken as periodic.
+        Number of averaged periods (``"fourier"``); 0 for ``"butterworth"``.
     periodicity
-        Root mean square of what differs between periods over that of the position, largest
-        axis; NaN with fewer than two periods.
+        Rms difference between periods relative to the rms position, of the worst axis; NaN with
+        fewer than two periods.
     method
         ``"butterworth"`` or ``"fourier"``.
     """
@@ -81,11 +80,11 @@ class MotionEstimate:
 
     @property
     def n_samples(self) -> int:
-        """Samples left."""
+        """Number of samples after filtering and decimation."""
         return len(self.time_s)
 
     def __str__(self) -> str:
-        """Say what was done, in a sentence or two."""
+        """Return one or two sentences on the filtering."""
         start, end = self.dropped
         text = (
             f"{self.n_samples} samples every {self.sample_time_s:g} s (decimation "
@@ -109,26 +108,25 @@ def estimate_motion(
     decimation: int | None = None,
     amplitude_error: float = 0.01,
 ) -> MotionEstimate:
-    """Return position, velocity, acceleration and torque of a record, filtered alike.
+    """Return position, velocity, acceleration and torque of a record, all with the same filter.
 
     Parameters
     ----------
     position_rad, torque_nm : (n_samples, n_axes) or (n_samples,), uniform samples.
-    sample_time_s : of the record [s].
-    cutoff_hz : end of the band to keep; well above the motion, well below the first resonance.
-    method : ``"butterworth"``, a low-pass of ``order`` run forward and backward and central
-        differences; or ``"fourier"`` for a periodic record: the periods are averaged, lines
-        above the cutoff are removed and the rest is differentiated exactly, ``(i omega)^k``.
-    order : of the Butterworth filter; the two passes have the gain of twice that order.
+    sample_time_s : sample time of the record [s].
+    cutoff_hz : end of the band to keep [Hz]; well above the motion, well below the first resonance.
+    method : ``"butterworth"``, a low-pass of ``order`` run forward and backward, with central
+        differences; or ``"fourier"`` for a periodic record. ``"fourier"`` averages the periods,
+        removes lines above the cutoff and differentiates the rest exactly, ``(i omega)^k``.
+    order : order of the Butterworth filter; the two passes have the gain of twice that order.
     period_samples : length of a period for ``"fourier"``; the record is a whole number of them.
-    decimation : every how many samples one is kept. By default the largest number for which
-        the new Nyquist frequency is at least twice the cutoff (``"butterworth"``: what folds
-        back is below 2^(-2 order) of its amplitude) or above it (``"fourier"``).
-    amplitude_error : relative error of amplitudes at the edge of the band that is reported.
+    decimation : keep one of this many samples. By default the largest factor for which the new
+        Nyquist frequency is at least twice the cutoff (``"butterworth"``: aliases are below
+        2^(-2 order) of their amplitude) or above it (``"fourier"``).
+    amplitude_error : relative error of amplitudes at the edge of the reported band.
 
-    With ``"butterworth"`` both ends are dropped over the time in which the slowest pole falls
-    to 0.001: there the result depends on how the record is thought to go on. Raises
-    InputError naming the field.
+    ``"butterworth"`` drops both ends over the time in which the slowest pole falls to 0.001, because
+    the result there depends on assumptions outside the record. Raises InputError naming the field.
 
     """
     position = _signal("position_rad", position_rad)
@@ -170,10 +168,10 @@ def amplitude_gain(
 ) -> Array:
     """Return the gain of ``"butterworth"`` on position (0), velocity (1) or acceleration (2).
 
-    That of the two passes, ``1 / (1 + (tan(pi f T) / tan(pi f_c T))^(2 order))``, times that of
-    the central difference, ``sin(w T) / (w T)`` or ``(sin(w T / 2) / (w T / 2))^2``. ``sample_time_s``
-    [s] is that before decimation; ``derivative`` says which; ``cutoff_hz`` and ``order`` are the
-    filter's.
+    It is the gain of the two passes, ``1 / (1 + (tan(pi f T) / tan(pi f_c T))^(2 order))``, times that
+    of the central difference, ``sin(w T) / (w T)`` or ``(sin(w T / 2) / (w T / 2))^2``.
+    ``frequency_hz`` is in Hz, ``sample_time_s`` [s] is that before decimation, ``derivative`` is 0, 1
+    or 2, and ``cutoff_hz`` [Hz] and ``order`` are those of the filter.
     """
     f = np.asarray(frequency_hz, dtype=np.float64)
     warped = np.tan(np.pi * f * sample_time_s) / math.tan(math.pi * cutoff_hz * sample_time_s)
@@ -198,7 +196,7 @@ def _butterworth(
 ) -> MotionEstimate:
     poles = scipy.signal.butter(order, 2.0 * cutoff_hz * step, output="zpk")[1]
     slowest = float(np.abs(poles).max())
-    # One sample more at least, for the central difference.
+    # At least one sample, for the central difference.
     trim = max(1, math.ceil(math.log(_TRANSIENT) / math.log(slowest)))
     n = len(position)
     if n - 2 * trim < 2 * decimation:
@@ -222,7 +220,7 @@ def _butterworth(
         ]
         return max(losses) - error
 
-    # Every gain falls with frequency, to one half or less at the cutoff.
+    # Every gain falls with frequency, to one half or less at the cutoff, so a root exists.
     edge = float(scipy.optimize.brentq(excess, 1e-9 * cutoff_hz, cutoff_hz))
     return MotionEstimate(
         time_s=np.asarray(keep * step, dtype=np.float64),
@@ -263,7 +261,7 @@ def _fourier(
         raise InputError(
             f"cutoff_hz: expected at least the first line {1.0 / (n * step):g} Hz, got {cutoff_hz:g}"
         )
-    # The least number of samples of a period above twice the highest line that divides it.
+    # The largest decimation that divides the period and keeps the highest line below Nyquist.
     factor = decimation or max(d for d in range(1, n) if n % d == 0 and n // d > 2 * last)
     if n % factor or n // factor <= 2 * last:
         raise InputError(
@@ -301,7 +299,7 @@ def _fourier(
 
 
 def _refuse_jump(period: Array) -> None:
-    """A record that does not close would leak into every derivative."""
+    """Raise InputError for a record that is not periodic, because it would leak into all derivatives."""
     inside = np.abs(np.diff(period, axis=0)).max(axis=0)
     across = np.abs(period[0] - period[-1])
     open_axes = np.flatnonzero(across > _JUMP * inside)

@@ -39,7 +39,7 @@ _UNITS = {
 
 @dataclass(frozen=True)
 class Column:
-    """One parameter: name, unit, nominal value, and its extra column in the core if it has one."""
+    """One parameter: name, unit, nominal value, and its extra column in the core, if any."""
 
     name: str
     unit: str
@@ -67,15 +67,15 @@ def drive_columns(
 ) -> list[Column]:
     """Return the columns of rotors, friction and offsets, axis by axis, then springs.
 
-    ``row_map`` (n_rows, n_joints) is what the rows of the regression make of joint torques.
+    ``row_map`` (n_rows, n_joints) maps joint torques to the rows of the regression.
     """
     joints = robot.axis_joints
     place = np.zeros((robot.n_axes, robot.n_joints))
     place[np.arange(robot.n_axes), joints] = 1.0
-    # Motor angles of joint angles, and rows of motor torques.
+    # Maps from joint angles to motor angles, and from motor torques to rows.
     motor_motion = coupling.position @ place
     motor_rows = row_map @ place.T @ coupling.torque
-    # In motor-side rows a motor torque is itself; rounding of the inverse has no place there.
+    # In motor-side rows this is the identity, apart from rounding errors of the inverse.
     motor_rows[np.abs(motor_rows) < 1e-13 * np.abs(motor_rows).max()] = 0.0
     nominal = robot.parameters()
     columns = []
@@ -97,7 +97,7 @@ def _springs(robot: Robot, nominal: dict[str, float], row_map: Array) -> list[Co
     columns = []
     for joint in sorted(set(range(robot.n_joints)) - set(robot.axis_joints)):
         motion = np.eye(robot.n_joints)[joint].tolist()
-        # Without a motor the torque on the row is zero: inertia + K q + D q' = 0.
+        # An elastic joint has no motor, so its row is zero: inertia + K q + D q' = 0.
         for quantity, unit, signal in (
             ("stiffness", "Nm/rad", "position"),
             ("damping", "Nm s/rad", "velocity"),

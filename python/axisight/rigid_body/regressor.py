@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class TorqueModel:
-    """What is regressed: robot, drive terms, side of the torques, couplings.
+    """The linear torque model: robot, drive terms, side of the torques, couplings.
 
     Parameters
     ----------
@@ -29,7 +29,8 @@ class TorqueModel:
     coupling : gears between motors and joints; default the gear ratios of the robot.
 
     Motions are always those of all joints, (n, n_joints) [rad, rad/s, rad/s^2]; on a
-    prismatic joint rad reads m and Nm reads N. Motors and gears count as rigid.
+    prismatic joint rad reads m and Nm reads N. Motors and gears are rigid. Raises InputError for
+    another side, and for a coupling of another number of axes.
 
     """
 
@@ -61,7 +62,7 @@ class TorqueModel:
 
     @cached_property
     def row_map(self) -> Array:
-        """Rows as combinations of joint torques, shape (n_rows, n_joints)."""
+        """Map from joint torques to rows, shape (n_rows, n_joints)."""
         identity = np.eye(self.robot.n_joints)
         if self.side == "joint":
             return identity
@@ -98,12 +99,12 @@ class TorqueModel:
 
     @property
     def nominal(self) -> Array:
-        """Values in the robot file, shape (n_parameters,); what it does not hold is zero."""
+        """Values of the robot file, shape (n_parameters,), zero for parameters that it does not have."""
         return np.array([column.nominal for column in self.columns])
 
     @property
     def row_names(self) -> list[str]:
-        """Names of the rows: joints."""
+        """Names of the rows: those of their joints."""
         names = self.robot.joint_names
         return names if self.side == "joint" else [names[j] for j in self.robot.axis_joints]
 
@@ -119,11 +120,14 @@ class TorqueModel:
 
     @cached_property
     def extras(self) -> list[tuple[str, list[float], list[float], float, float]]:
-        """Extra columns as the core takes them."""
+        """Extra columns in the form of the core."""
         return [column.extra for column in self.columns if column.extra is not None]
 
     def motion(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> tuple[Array, Array, Array]:
-        """Check a motion ``q``, ``v``, ``a`` and return it as float64 arrays (n, n_joints)."""
+        """Return a checked motion ``q``, ``v``, ``a`` as float64 arrays (n, n_joints).
+
+        Raises InputError for wrong shapes and values that are not finite.
+        """
         arrays = [
             rows(name, value, self.robot.n_joints) for name, value in (("q", q), ("v", v), ("a", a))
         ]
@@ -135,7 +139,7 @@ class TorqueModel:
     def matrix(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, threads: int = 0) -> Array:
         """Return the regressor, shape (n, n_rows, n_parameters).
 
-        Arguments ``q``, ``v``, ``a``, ``threads`` as of :func:`torque_regressor`.
+        Arguments ``q``, ``v``, ``a``, ``threads`` are those of :func:`torque_regressor`.
         """
         q, v, a = self.motion(q, v, a)
         return _core.torque_regressor(
@@ -149,7 +153,7 @@ def as_model(
     side: Side | None,
     coupling: MotorCoupling | None,
 ) -> TorqueModel:
-    """Return the torque model of a robot and options, or the model given in its place."""
+    """Return the torque model of a robot with options, or the given model."""
     if isinstance(robot, TorqueModel):
         if not (terms is None and side is None and coupling is None):
             raise InputError(
@@ -182,17 +186,16 @@ def torque_regressor(
     side : ``"joint"``: rows are torques of all joints [Nm]; ``"motor"``: motor torques of
         the driven axes [Nm].
     coupling : gears between motors and joints; default the gear ratios of the robot.
-    threads : threads to use, 0 for all; the result does not depend on it.
+    threads : number of threads, 0 for all cores; the result does not depend on it.
 
     Returns
     -------
     DataArray (sample, joint, parameter), or (sample, axis, parameter) on the motor side.
     Parameters are, for every link with mass, ``<joint>.mass`` [kg], ``mass_x``, ``mass_y``,
     ``mass_z`` (first moments m c [kg m]) and ``inertia_xx`` .. ``inertia_yz`` (about the
-    origin of the link frame, link axes [kg m^2]), then those of ``terms``; coordinates
-    ``unit`` and ``nominal`` (values of the robot) go along ``parameter``. With them
-    the regressor gives inverse dynamics. Raises InputError for wrong shapes and non-finite
-    values.
+    origin of the link frame, link axes [kg m^2]), then those of ``terms``. Coordinates along
+    ``parameter`` are ``unit`` and ``nominal``, the values of the robot. The regressor times
+    ``nominal`` is the inverse dynamics. Raises InputError for wrong shapes and non-finite values.
 
     """
     model = TorqueModel(robot, terms=terms, side=side, coupling=coupling)
@@ -210,7 +213,7 @@ def torque_regressor(
 
 
 def rows(field: str, value: ArrayLike, width: int) -> Array:
-    """Check an array (n, width) of finite numbers, at least one row."""
+    """Return a checked array (n, width) of finite numbers with at least one row."""
     try:
         raw = np.asarray(value)
         if raw.dtype.kind not in "fiu":

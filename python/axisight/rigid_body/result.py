@@ -25,37 +25,37 @@ Array = NDArray[np.float64]
 @summarized
 @dataclass(frozen=True, eq=False)
 class RigidBodyEstimate:
-    """Base parameters with their uncertainty, and how well they explain the torques.
+    """Base parameters with their uncertainty, and the torque errors that they leave.
 
     base
-        What the parameters are.
+        Definition of the base parameters.
     method
         ``"ls"``, ``"wls"`` or ``"tls"``.
     values
         Base parameters, shape (n_base,), units ``base.units``; eliminated ones are zero.
     covariance
-        From the scatter of blocks, shape (n_base, n_base): holds for residuals that are
+        From the scatter of blocks, shape (n_base, n_base); valid for residuals that are
         correlated in time and between axes.
     covariance_white
-        The same if residuals were white, of each row its own variance.
+        The covariance for white residuals, with a separate variance for each row.
     degrees_of_freedom
-        Of the block scatter, per parameter, shape (n_base,).
+        Degrees of freedom of the block scatter, per parameter, shape (n_base,).
     residual_rms_nm, relative_error
-        Per row: root mean square of the residual [Nm], and over that of the torque.
+        Per row: rms residual [Nm], and the same relative to the rms torque.
     residual_std_nm
-        Per row, with the degrees of freedom that the fit has taken.
+        Per row: standard deviation of the residual [Nm], corrected for degrees of freedom.
     condition_number, condition_number_scaled
-        Of the weighted regressor, and with its columns at unit length.
+        Condition number of the weighted regressor, and the same with columns of unit length.
     known
-        Parameters held fixed.
+        Parameters held fixed, with their values.
     eliminated
         Base parameters set to zero.
     iterations, converged
-        Of the row weights.
+        Iterations of the row weights, and whether they converged.
     n_samples, n_blocks
-        Behind the estimate and behind its scatter.
+        Number of samples of the estimate, and of blocks of its scatter.
     findings
-        What is doubtful about it.
+        Reasons to doubt the estimate.
     """
 
     base: BaseParameters
@@ -94,7 +94,7 @@ class RigidBodyEstimate:
         n_blocks: int,
         findings: tuple[IdentificationFinding, ...],
     ) -> RigidBodyEstimate:
-        """Put a solution for some of the base parameters together."""
+        """Return the result from a solution for the base parameters ``keep``."""
         n = len(base)
         values, degrees = np.zeros(n), np.full(n, np.inf)
         values[keep], degrees[keep] = solution.values, freedom
@@ -128,7 +128,7 @@ class RigidBodyEstimate:
         )
 
     def with_findings(self, findings: Iterable[IdentificationFinding]) -> RigidBodyEstimate:
-        """Return the same with these findings."""
+        """Return the estimate with these findings."""
         return replace(self, findings=tuple(findings))
 
     @property
@@ -142,7 +142,7 @@ class RigidBodyEstimate:
         return self.base.names
 
     def _repr_html_(self) -> str:
-        """Base parameters with standard errors, for notebooks."""
+        """Return base parameters with standard errors, for notebooks."""
         return html.page(
             f"base parameters by {self.method}, {self.n_samples} samples",
             html.values(self.names, self.values, self.standard_error, self.base.units),
@@ -162,14 +162,13 @@ class RigidBodyEstimate:
         return np.divide(self.standard_error, size, out=out, where=size > 0)
 
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """Return the bounds of the confidence intervals of a ``level``, by Student's distribution."""
+        """Return lower and upper bounds of confidence intervals with probability ``level``, by Student."""
         return student_interval(self.values, self.standard_error, self.degrees_of_freedom, level)
 
     def standard(self, prior: ArrayLike | None = None) -> Array:
-        """Return standard parameters (model order) that give these base parameters.
+        """Return standard parameters (model order) nearest to ``prior`` with these base parameters.
 
-        Those nearest to ``prior``; see :meth:`BaseParameters.to_standard`. Known parameters
-        have their known values.
+        See :meth:`BaseParameters.to_standard`. Known parameters have their known values.
         """
         start = self.model.nominal if prior is None else np.array(prior, dtype=np.float64)
         for name, value in self.known.items():
@@ -189,10 +188,11 @@ class RigidBodyEstimate:
     def torque_error(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, torque_nm: ArrayLike
     ) -> xr.Dataset:
-        """Return the error on a motion ``q``, ``v``, ``a``, e.g. one held out.
+        """Return the torque error on a motion ``q``, ``v``, ``a``, e.g. one that was held out.
 
-        Dataset over rows: ``rms_nm`` and ``relative_error``, rms(model - measured) over
-        rms(measured).
+        The motion is (n, n_joints) and ``torque_nm`` (n, n_rows) [Nm]. Returns a Dataset over rows:
+        ``rms_nm`` [Nm] and ``relative_error``, rms(model - measured) over rms(measured). Raises
+        InputError for wrong shapes.
         """
         predicted = self.predict(q, v, a)
         torque = rows("torque_nm", torque_nm, self.model.n_rows)
@@ -235,7 +235,7 @@ class RigidBodyEstimate:
         )
 
     def __str__(self) -> str:
-        """Return a table for a person."""
+        """Return the estimate as a table of text."""
         lines = [f"{'parameter':34}{'value':>12}{'std. error':>12}{'rel.':>8}  unit"]
         rows_of = zip(
             self.names,

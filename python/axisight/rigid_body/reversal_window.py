@@ -1,7 +1,7 @@
-"""Samples around reversals of a motor, which a filtered log has wrong and a fit leaves out.
+"""Samples around reversals of a motor, which a fit leaves out because the filter distorts them.
 
-The filter smears the step of Coulomb friction in the torque, over some periods of its cutoff; the
-regressor has the step sharp.
+The filter smears the step of Coulomb friction in the torque over some periods of its cutoff, while
+the step in the regressor is sharp.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from axisight.rigid_body.motion import MotionEstimate
 Array = NDArray[np.float64]
 
 LEAST_KEPT = 0.05
-"""Share of an axis's samples that has to be left."""
+"""Least share of an axis's samples that must be left."""
 USUAL_PERIODS = (2.0, 1.5, 1.0, 0.5)
-"""Periods of the cutoff left out by default: the first that leaves enough of an axis."""
+"""Periods of the cutoff to leave out by default; the first entry that leaves enough samples applies."""
 USUAL_KEPT = 0.2
-"""Share of an axis's samples that is enough for that."""
+"""Share of an axis's samples that counts as enough."""
 
 
 def reversal_weight(
@@ -31,12 +31,12 @@ def reversal_weight(
     cutoff_hz: float,
     moving: NDArray[np.bool_] | None = None,
 ) -> tuple[Array, list[IdentificationFinding]]:
-    """Return weights (n, n_axes) of one, zero around reversals, of all motions, and what to say.
+    """Return weights (n, n_axes) for all motions, one or zero around reversals, and findings.
 
-    ``reversal_s`` is how long before and after a reversal samples are left out; by default two periods
-    of the cutoff, or less on axes that turn so often that hardly any sample would be left,
-    which is a serious finding. Samples where an axis is not ``moving`` (n, n_axes) are left out, and
-    are no part of what counts as left. Raises InputError if too little is left.
+    ``reversal_s`` [s] is the time before and after a reversal in which samples are left out. By default
+    it is two periods of the cutoff, or less, with a serious finding, on axes that reverse too often.
+    Samples where an axis is not ``moving`` (n, n_axes) are left out and do not count in the shares.
+    Raises InputError if too few samples are left.
     """
     given = reversal_s
     if given is not None and (isinstance(given, bool) or not (np.isfinite(given) and given >= 0)):
@@ -60,7 +60,7 @@ def reversal_weight(
 
 
 def _away(motion: MotionEstimate, margin_s: float) -> Array:
-    """One, and zero within ``margin_s`` of a change of sign of the motor velocity, (n, n_axes)."""
+    """Return weights (n, n_axes): zero within ``margin_s`` of a reversal of the motor, else one."""
     out = np.ones_like(motion.velocity_rad_s)
     if margin_s > 0:
         reach = int(np.ceil(margin_s / motion.sample_time_s))

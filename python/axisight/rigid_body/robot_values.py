@@ -30,29 +30,31 @@ def identified_bodies(
 ) -> Identified:
     """Return standard parameters in the terms of a robot file, for `write_identified`.
 
-    First moments become centres of mass and inertias about the link frame those about the
+    First moments become centres of mass. Inertias about the link frame become inertias about the
     centre of mass: I_c = I - (|h|^2 1 - h h^T) / m with h = m c. Coulomb friction and torque
-    offsets become effects. Effects of the robot whose torque the regression has taken up (see
-    `axisight.robot_file.absorbed`) are removed, and a note says so: a payload and balancers, which
-    the links now hold; errors of torque constants, in which all is measured; friction, offset and
-    rotor inertia of an axis by the terms of its drive.
+    offsets become effects. Effects of the robot whose torque the parameters now include (see
+    `axisight.robot_file.absorbed`) are removed, with a note:
+
+    - payload and balancers, which the links now include
+    - errors of torque constants, which scale all measured torques
+    - friction, offset and rotor inertia of an axis, which the terms of its drive replace
 
     model
-        On the motor side, where the robot file has its friction and rotor inertias.
+        A model on the motor side, where the robot file has its friction and rotor inertias.
     theta
         (p,) in the order of ``model.names``: ``ConsistentParameters.theta``, or
         ``RigidBodyEstimate.standard()``, whose bodies need not exist (`write_identified`
         refuses those).
     provenance
-        Where they come from.
+        Source of the values.
     covariance
-        (p, p) of theta, carried through to first order; without it standard errors are unknown.
+        (p, p) of theta, converted to first order; without it standard errors are unknown.
     corner_rad_s
-        (n_axes,) motor speeds over which the sign in Coulomb friction is smoothed [rad/s]; without
-        them the usual one of the effect, which suits motors and is wide for slides and joints.
+        (n_axes,) motor speeds over which Coulomb friction smooths the sign [rad/s]. Without them the
+        effect's default applies, which suits motors and is wide for slides and joints.
 
     Raises InputError for a model on the joint side and numbers that do not fit the model or are
-    not finite, RobotError for masses that are not positive.
+    not finite, and RobotError for masses that are not positive.
     """
     if model.side != "motor":
         raise InputError(f"model: expected side 'motor', got {model.side!r}")
@@ -108,7 +110,7 @@ def identified_bodies(
 
 
 def _taken_up(model: TorqueModel, found: list[Effect]) -> list[Effect]:
-    """Effects of the robot that links and drive terms of the model stand for now."""
+    """Return the effects of the robot that links and drive terms of the model now include."""
     own = model.robot.effects
     out = absorbed_effects(own, ["links", "torque"], axis=None)
     for name in model.names:
@@ -120,7 +122,7 @@ def _taken_up(model: TorqueModel, found: list[Effect]) -> list[Effect]:
 
 
 def _corner(effect: str, corner_rad_s: float) -> dict[str, float]:
-    """Return the smoothing of an effect that has one, within its bounds."""
+    """Return the smoothing parameter of an effect, within its bounds; empty for an effect without one."""
     for p in effect_info(effect).parameters:
         if p.name == "smoothing_rad_s":
             return {p.name: float(np.clip(corner_rad_s, p.lower, p.upper))}
@@ -128,7 +130,7 @@ def _corner(effect: str, corner_rad_s: float) -> dict[str, float]:
 
 
 def _axis(model: TorqueModel, joint: str) -> int:
-    """Number of the axis, from 1, of a driven joint."""
+    """Return the number of the axis, from 1, of a driven joint."""
     driven = [n.removesuffix(".motor_inertia") for n in _rotors(model)]
     return driven.index(joint) + 1
 
@@ -138,7 +140,7 @@ def _rotors(model: TorqueModel) -> list[str]:
 
 
 def _about_centre(link: Array) -> tuple[Array, Array]:
-    """Mass, centre of mass, inertia about it, and their derivatives by link parameters."""
+    """Return mass, centre of mass and inertia about it, and their derivatives by link parameters."""
     mass, h = link[0], link[1:4]
     out, jacobian = link.copy(), np.eye(LINK)
     out[1:4] = h / mass

@@ -1,9 +1,9 @@
 """Exact derivatives of a torque regressor with respect to the motion.
 
-Every entry is, in each revolute joint angle, a trigonometric polynomial of degree two (kinetic
-energy is a square of first-degree terms), in each prismatic position and each velocity a
-polynomial of degree two, and linear in the accelerations. So a few shifted evaluations give the
-derivative without an error of discretisation.
+Every entry is a trigonometric polynomial of degree two in each revolute joint angle, because kinetic
+energy is a square of first-degree terms. It is a polynomial of degree two in each prismatic position
+and each velocity, and linear in the accelerations. A few shifted evaluations therefore give the
+derivative without discretisation error.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Sensitivity:
 
 
 def regressor_sensitivity(model: TorqueModel, q: Array, v: Array, a: Array) -> Sensitivity:
-    """Return the regressor of ``model`` and its derivatives, motions (n, n_joints)."""
+    """Return the regressor of ``model`` and its derivatives, for motions (n, n_joints)."""
     joints = model.robot.axis_joints
     n, links = len(q), sum(column.extra is None for column in model.columns)
     # One call for all shifts: (block, sample, joint).
@@ -80,7 +80,7 @@ def regressor_sensitivity(model: TorqueModel, q: Array, v: Array, a: Array) -> S
 def _signal(
     signal: str, motion: tuple[Array, Array, Array], dead_band: float, smoothing: float
 ) -> tuple[Array, Array]:
-    """Level of an extra column and its slope; that of a step counts as zero."""
+    """Return the value of an extra column and its slope, zero for a step."""
     position, velocity, acceleration = motion
     if signal == "constant":
         return np.ones_like(velocity), np.zeros_like(velocity)

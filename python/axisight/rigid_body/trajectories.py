@@ -1,7 +1,7 @@
-"""Optimal excitation: Fourier trajectories that make rigid-body parameters well determined.
+"""Optimal excitation: Fourier trajectories that determine rigid-body parameters well.
 
-Criteria and parametrization follow Swevers et al. (1997) and Wernholt (2004), section 4.3: the
-condition number of the scaled base regressor, or ``-log det(Phi^T W Phi)``.
+Criteria and parametrization follow Swevers et al. (1997) and Wernholt (2004), section 4.3. The
+criterion is the condition number of the scaled base regressor, or ``-log det(Phi^T W Phi)``.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ Status = Literal["converged", "max_iterations", "infeasible"]
 QUANTITIES = ("position", "velocity", "acceleration", "torque")
 
 _NORMS = (16.0, 64.0)
-"""Exponents that stand for a maximum: a p-norm over n samples is at most n^(1/p) too large."""
+"""Exponents of the p-norms that replace a maximum; over n samples they exceed it by at most n^(1/p)."""
 _TORQUE_RESERVE = 0.02
-"""Torque has harmonics of its own: what may hide between the samples of the search."""
+"""Allowance for torque peaks between the samples of the search, because torque has higher harmonics."""
 _SMOOTHING = 0.02
-"""Share of the velocity limit over which the direction of motion changes during the search."""
+"""Share of the velocity limit over which the search smooths the sign of the velocity."""
 _ADVICE: dict[str, str] = {
     "converged": "",
     "max_iterations": "still improving: allow more iterations",
@@ -45,15 +45,15 @@ _ADVICE: dict[str, str] = {
 @summarized
 @dataclass(frozen=True)
 class MotionLimits:
-    """What a trajectory must not pass, joint side; one number for all axes or one per axis.
+    """Limits of a trajectory, joint side; one number for all axes or one per axis.
 
     position_rad
         (n_axes, 2), lower and upper [rad or m].
     velocity_rad_s, acceleration_rad_s2
         Largest absolute values.
     torque_nm
-        Largest absolute values of the rows of the torque model, motor or joint side as it has
-        them; None for no limit.
+        Largest absolute values of the rows of the torque model, on the side of the model; None for no
+        limit.
     """
 
     position_rad: ArrayLike
@@ -72,22 +72,22 @@ class TrajectoryDesign:
     criterion
         ``"condition"`` or ``"log_det"``.
     before, after
-        Criterion of the start this one came from, and in the end, on a grid finer than that of the
-        search and with the true direction of motion.
+        Criterion at the start and at the end, on a finer grid than that of the search and with the
+        exact sign of the velocity.
     condition_before, condition_after
-        Condition number of the scaled base regressor.
+        Condition number of the scaled base regressor at the start and at the end.
     margins
-        Peak over limit, over (``quantity``, ``axis``): above one passes the limit; NaN without
-        a limit. Position counts from the middle of its range. Peaks between samples are
-        bounded, not only sampled, for all but torque.
+        Peak over limit, over (``quantity``, ``axis``): above one exceeds the limit; NaN without
+        a limit. Position counts from the middle of its range. Except for torque, peaks include a bound
+        on values between samples.
     starts
         Over ``start``: ``before``, ``after``, ``feasible``, ``converged``, ``iterations``.
     status, advice
-        Of the best start: ``"converged"``, ``"max_iterations"`` or ``"infeasible"``.
+        Status of the best start: ``"converged"``, ``"max_iterations"`` or ``"infeasible"``.
     columns
-        Positions of the base columns in the parameters of the model.
+        Positions of the base columns among the parameters of the model.
     design
-        Settings and seed in plain numbers and words.
+        Settings and seed as plain numbers and text.
     """
 
     trajectory: FourierTrajectory
@@ -125,27 +125,27 @@ def optimize_trajectory(
 
     Parameters
     ----------
-    model : what will be identified; elastic joints stand still.
-    limits : what must not be passed.
+    model : torque model to identify; elastic joints stand still.
+    limits : limits of the trajectory.
     fundamental_hz : one over the period [Hz].
-    harmonics : of every axis; more of them, and higher, excite inertia more and flexibilities
-        too.
+    harmonics : number of harmonics of every axis. Higher harmonics excite inertias more, but also
+        flexibilities.
     criterion : ``"condition"``, the condition number of the scaled base regressor, or
         ``"log_det"``, ``-log det(Phi^T W Phi)`` per parameter.
     columns : base columns; by default those that pivoted QR finds independent.
     scale : prior sizes of the base parameters, which scale the columns for the condition
-        number; by default columns are brought to equal size over random motions.
-    torque_std_nm : noise of the rows, one number or (n_rows,); the weight W is its inverse square.
+        number; by default columns have equal size over random motions.
+    torque_std_nm : noise of the rows [Nm], one number or (n_rows,); W is its inverse square.
     theta : parameters that predict the torque, by default those of the robot.
-    start_at_rest : no velocity and acceleration at t = 0; else periodic only.
-    starts : random starts; start i is a function of (``seed``, i).
-    seed : rules the starts.
-    samples : per period in the search, by default 20 per harmonic and at least 60.
-    max_iterations : of SLSQP in each of its two rounds.
+    start_at_rest : whether velocity and acceleration are zero at t = 0.
+    starts : number of random starts; start i is a function of (``seed``, i).
+    seed : seed of the starts.
+    samples : samples per period in the search, by default 20 per harmonic and at least 60.
+    max_iterations : most iterations of SLSQP in each of its two rounds.
 
-    Derivatives are exact; Coulomb friction is smoothed over 2 % of the velocity limit in the
-    search only. A trajectory that passes a limit is never reported as converged. Raises
-    InputError naming the field.
+    Derivatives are exact. Only the search smooths Coulomb friction, over 2 % of the velocity limit.
+    A trajectory that exceeds a limit is never reported as converged. Raises InputError naming the
+    field.
 
     """
     problem = _Problem(
@@ -171,7 +171,7 @@ def optimize_trajectory(
     problem.aim(criterion, columns, scale, np.broadcast_to(std, (model.n_rows,)), values, seed)
     iterations = _whole("max_iterations", max_iterations, 1)
     runs = [problem.run(seed, k, iterations) for k in range(_whole("starts", starts, 1))]
-    # Feasible ones first, then the criterion.
+    # A feasible run is better than any infeasible one.
     best = min(range(len(runs)), key=lambda k: (not runs[k].feasible, runs[k].after))
     return problem.report(runs, best, seed)
 
@@ -192,8 +192,8 @@ class _Run:
 class _Problem:
     """Criterion and limits over the free coefficients, with their gradients.
 
-    Coefficients of an axis are ``[centre, sine, cosine]``; those of all axes in a row are
-    ``basis @ x``, which satisfies the conditions at the start for every x.
+    Coefficients of an axis are ``[centre, sine, cosine]``. Those of all axes together are
+    ``basis @ x``, which satisfies the conditions at t = 0 for every x.
     """
 
     def __init__(
@@ -222,7 +222,7 @@ class _Problem:
             for k, matrix in enumerate(series(fundamental_hz, harmonics, time))
         )
         self.basis = self._basis()
-        # A trigonometric polynomial of degree h is at most this factor above n samples of it.
+        # The peak of a trigonometric polynomial of degree h exceeds n samples by at most this factor.
         self.hidden = 1.0 / np.cos(np.pi * harmonics / samples)
 
     def _basis(self) -> Array:
@@ -233,7 +233,7 @@ class _Problem:
             rest[0, 1 : 1 + h] = 1.0
             rest[1, 1 + h :] = np.arange(1, h + 1)
             one = scipy.linalg.null_space(rest)
-        # Velocities in units of their limit, centres in units of the range.
+        # Velocities are relative to their limit, and centres to the range.
         out = np.zeros((n, 1 + 2 * h, n, one.shape[1]))
         for k in range(n):
             size = np.full(1 + 2 * h, self.bounds["velocity"][k])
@@ -250,7 +250,7 @@ class _Problem:
         theta: Array,
         seed: int,
     ) -> None:
-        """Fix criterion, base columns and scaling."""
+        """Set criterion, base columns and scaling."""
         self.criterion, self.std, self.theta = criterion, std, theta
         rng = np.random.default_rng((seed, 1 << 32))
         shape = (20 * self.model.n_parameters, len(self.joints))
@@ -287,24 +287,24 @@ class _Problem:
             self.scale = given
 
     def _all(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Motions of all joints; elastic ones at zero."""
+        """Return the motions of all joints, with elastic joints at zero."""
         out = np.zeros((3, len(q), self.model.robot.n_joints))
         for full, part in zip(out, (q, v, a), strict=True):
             full[:, self.joints] = part
         return out[0], out[1], out[2]
 
     def motion(self, x: Array) -> tuple[Array, Array, Array]:
-        """Motion (samples, n_axes) of free coefficients x."""
+        """Return the motion (samples, n_axes) of free coefficients x."""
         c = (self.basis @ x).reshape(len(self.joints), -1).T
         return self.series[0] @ c, self.series[1] @ c, self.series[2] @ c
 
     def pull(self, by_motion: list[Array]) -> Array:
-        """Gradient over x of gradients over q, v, a, each (samples, n_axes)."""
+        """Return the gradient over x from gradients over q, v, a, each (samples, n_axes)."""
         c = sum(m.T @ g for m, g in zip(self.series, by_motion, strict=True))
         return np.asarray(self.basis.T @ np.asarray(c).T.ravel())
 
     def value(self, phi: Array) -> tuple[float, Array]:
-        """Criterion of the weighted, scaled base regressor (m, b), and its gradient."""
+        """Return the criterion of the weighted, scaled base regressor (m, b), and its gradient."""
         u, s, vt = np.linalg.svd(phi, full_matrices=False)
         if s[-1] <= 1e-14 * s[0]:
             s = np.maximum(s, 1e-14 * s[0])
@@ -312,12 +312,12 @@ class _Problem:
             slope = np.outer(u[:, 0], vt[0]) / s[0] - np.outer(u[:, -1], vt[-1]) / s[-1]
             return float(np.log(s[0] / s[-1])), slope
         b = len(s)
-        # Phi = phi_true scale: the determinant of the scale is taken off.
+        # phi includes the scale, so its determinant is subtracted.
         free = float(np.log(self.scale).sum()) * 2.0
         return (free - 2.0 * float(np.log(s).sum())) / b, (-2.0 / b) * ((u / s) @ vt)
 
     def evaluate(self, x: Array, norm: float) -> tuple[float, Array, Array, Array]:
-        """Criterion, gradient, limits ``1 - |.|_p`` (>= 0) and their Jacobian."""
+        """Return criterion, gradient, limits ``1 - |.|_p`` (>= 0) and their Jacobian."""
         q, v, a = self.motion(x)
         s = regressor_sensitivity(self.smooth, *self._all(q, v, a))
         n, rows, b = len(q), self.model.n_rows, len(self.columns)
@@ -377,7 +377,7 @@ class _Problem:
         )
 
     def start(self, rng: np.random.Generator) -> Array:
-        """Random coefficients, drawn together until they keep to the limits."""
+        """Return random coefficients, scaled together until they satisfy the limits."""
         n = len(self.joints)
         drawn = rng.normal(0.0, 1.0, self.basis.shape[1])
         coefficients = (self.basis @ drawn).reshape(n, -1)
@@ -401,12 +401,12 @@ class _Problem:
         )
 
     def check(self, x: Array) -> tuple[float, float, Array]:
-        """Criterion and condition with the true model on a fine grid, and the margins."""
+        """Return criterion and condition with the exact model on a fine grid, and the margins."""
         n = max(1000, 64 * self.harmonics)
         time = np.arange(n) / (n * self.fundamental_hz)
         q, v, a = self.trajectory(x).motion(time)
         phi = self.model.matrix(*self._all(q, v, a))
-        # As many samples as in the search, so that the determinant can be compared.
+        # Scaled to as many samples as in the search, so that determinants are comparable.
         share = np.sqrt(self.samples / n)
         flat = (phi[..., self.columns] * (share * self.scale) / self.std[:, None]).reshape(
             -1, len(self.columns)
@@ -476,7 +476,7 @@ class _Problem:
 
 
 class _Memory:
-    """The last evaluation: the optimiser asks for value, gradient and limits one by one."""
+    """The last evaluation, kept because the optimiser requests value, gradient and limits separately."""
 
     def __init__(self, problem: _Problem, norm: float) -> None:
         self.problem, self.norm = problem, norm
@@ -503,7 +503,7 @@ class _Memory:
 
 
 def _p_norm(x: Array, norm: float) -> tuple[Array, Array]:
-    """p-norms of the columns and their derivatives; at least the largest absolute value."""
+    """Return p-norms of the columns, which bound the largest absolute values, and derivatives."""
     top = np.maximum(np.abs(x).max(axis=0), 1e-300)
     size = top * np.sum((np.abs(x) / top) ** norm, axis=0) ** (1.0 / norm)
     return size, np.sign(x) * (np.abs(x) / size) ** (norm - 1.0)

@@ -1,4 +1,4 @@
-"""The robot: read from a description or a preset, its kinematics, dynamics and linearization."""
+"""Robots: reading descriptions and presets, kinematics, dynamics and linearization."""
 
 from axisight.robot.description import Drive, Joint, Link, Spring
 from axisight.robot.robot import Robot, load_robot

@@ -1,4 +1,4 @@
-"""Axes as a person names them: by number from 1, or by the joint that the axis drives."""
+"""Find the axis that a user names, by number from 1 or by the joint that it drives."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from axisight.arguments import did_you_mean, nearest, short, shown
 from axisight.effects import Effect
 from axisight.errors import InputError
 
-# Joints that a message lists.
+# A message lists at most this many joints.
 _MOST = 8
 
 
@@ -22,11 +22,11 @@ def axis_number(axis: object, joints: Sequence[str] | int, field: str = "axis") 
     Parameters
     ----------
     axis : the number, or the name of the joint that the axis drives.
-    joints : names of the joints that the axes drive, base to tip (`Robot.axis_names`); or, where
-        names are unknown, the number of axes.
-    field : what the message calls it.
+    joints : names of the joints that the axes drive, base to tip (`Robot.axis_names`), or the number of
+        axes if the names are unknown.
+    field : name of the argument in messages.
 
-    Raises InputError with the range, the joint names and the nearest one.
+    Raises InputError, with the range, the joint names and the nearest one, for an axis that is not there.
 
     """
     names = [] if isinstance(joints, int) else list(joints)
@@ -48,7 +48,7 @@ def _range(count: int) -> str:
 
 
 def _meant(axis: object, names: Sequence[str], count: int) -> str:
-    """Return the question for a joint name that is nearly one, or for a text that ends in a number."""
+    """Return a question that proposes the nearest joint name or the number in a text; "" without one."""
     number = re.fullmatch(r"\D*?0*(\d{1,9})\D?", axis.strip()) if isinstance(axis, str) else None
     near = nearest(axis, names)
     if near is not None and re.sub(r"\D", "", near) == re.sub(r"\D", "", str(axis)):
@@ -59,7 +59,7 @@ def _meant(axis: object, names: Sequence[str], count: int) -> str:
 
 
 def effect_on(effect: Effect, joints: Sequence[str]) -> Effect:
-    """Return an effect with axis numbers in place of joint names; raises InputError as `axis_number`."""
+    """Return an effect with axis numbers in place of joint names; raise InputError as `axis_number`."""
     if not effect.joints:
         return effect
     field = f"effect {effect.name!r}: axis"

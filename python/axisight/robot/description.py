@@ -1,4 +1,4 @@
-"""What a description says of a joint, as plain data, so that nobody else reads its text."""
+"""Joints of a robot description as plain data."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 class Spring:
     """A gearbox or an elastic joint: stiffness [Nm/rad] and damping [Nm s/rad].
 
-    N/m and N s/m if the joint slides.
+    The units are N/m and N s/m on a prismatic joint.
     """
 
     stiffness: float
@@ -30,8 +30,8 @@ class Spring:
 class Link:
     """The body that moves with a joint.
 
-    ``mass_kg``, centre of mass ``com_m`` (3,) in the link frame, and ``inertia_kg_m2`` (6,) about
-    it, in link axes: xx, yy, zz, xy, xz, yz.
+    ``mass_kg`` [kg]; centre of mass ``com_m`` (3,) [m] in the link frame; ``inertia_kg_m2`` (6,) [kg m^2]
+    about the centre of mass, in link axes: xx, yy, zz, xy, xz, yz.
     """
 
     mass_kg: float
@@ -44,7 +44,7 @@ class Link:
 class Drive:
     """Motor and gear of a driven joint.
 
-    ``gear_ratio`` is joint angle per motor angle [1, m/rad if it slides]; ``motor_inertia``
+    ``gear_ratio`` is joint angle per motor angle [1, or m/rad on a prismatic joint]; ``motor_inertia``
     [kg m^2] and ``viscous_friction`` [Nm s/rad] are on the motor side.
     """
 
@@ -56,11 +56,11 @@ class Drive:
 @summarized
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint of the chain and what it carries.
+    """A joint of the chain with its link, its spring and its drive.
 
-    ``origin_m`` (3,) and the unit vector ``axis`` (3,) stand in the parent link's frame.
-    ``spring`` is None for a rigid transmission, ``link`` for a massless one, ``drive`` where no
-    motor acts.
+    ``origin_m`` (3,) [m] and the unit vector ``axis`` (3,) are in the parent link's frame. ``spring`` is None
+    for a rigid transmission, ``link`` is None for a massless link, ``drive`` is None for a joint without a
+    motor.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Joint:
 
 
 def joint_of(entry: _core.JointEntry) -> Joint:
-    """Return a joint as the compiled core tells it."""
+    """Return the joint of an entry from the compiled core."""
     spring, link, drive = entry["spring"], entry["link"], entry["drive"]
     return Joint(
         name=entry["name"],

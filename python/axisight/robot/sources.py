@@ -1,4 +1,4 @@
-"""In which format a file says a robot: by its name, and of a TOML by what is in it."""
+"""Recognize the format of a file with a robot, by its suffix and, for TOML, by its content."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from axisight.documents import parse_toml, read_text
 from axisight.errors import RobotError
 
 MODEL_SUFFIXES = (".urdf", ".xml", ".mjcf", ".xacro", ".csv")
-"""How the names of files end that say a robot in another format."""
-# What only tables of Denavit and Hartenberg say of a joint.
+"""Suffixes of model files: robots in another format than that of robot files."""
+# Keys of a joint that occur only in tables of Denavit and Hartenberg.
 _GEOMETRY = ("theta_rad", "d_m", "a_m", "alpha_rad")
 
 
 def is_model_file(source: Path | str) -> bool:
-    """Whether a file says a robot in another format than that of robot files."""
+    """Whether a file is a model file: a robot in another format than that of robot files."""
     path = Path(source)
     suffix = path.suffix.lower()
     if suffix != ".toml":
         return suffix in MODEL_SUFFIXES
     try:
         return is_table(read_text(path))
-    except (OSError, ValueError):  # those who read it say why
+    except (OSError, ValueError):  # the reader of the file reports the reason
         return False
 
 
 def is_table(text: str) -> bool:
-    """Whether a TOML is a table of Denavit and Hartenberg, or was meant as one.
+    """Whether a TOML text is, or was meant as, a table of Denavit and Hartenberg.
 
-    It states no schema, but a convention, or joints by theta, d, a or alpha.
+    Such a table has no schema, but a convention, or joints with theta, d, a or alpha.
     """
     content = _content(text)
     if content is None or "schema" in content:
@@ -44,7 +44,7 @@ def is_table(text: str) -> bool:
 
 
 def refuse_neither(text: str, where: str) -> None:
-    """Raise RobotError for a TOML that is neither a robot file, in whatever version, nor a table."""
+    """Raise RobotError for a TOML text that is neither a robot file of any version nor a DH table."""
     content = _content(text)
     if content is None or "schema" in content or is_table(text):
         return
@@ -56,7 +56,7 @@ def refuse_neither(text: str, where: str) -> None:
 
 
 def _content(text: str) -> Mapping[str, Any] | None:
-    """Return what stands in a TOML, None where it is none: its reader says why."""
+    """Return the content of a TOML text; None if it is not TOML, which its reader reports."""
     try:
         return parse_toml(text)
     except ValueError:

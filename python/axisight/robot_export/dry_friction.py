@@ -1,4 +1,4 @@
-"""Coulomb friction of a robot as other libraries have it: of joints."""
+"""Coulomb friction of a robot on the joint side, as other libraries need it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from axisight.robot import Robot
 
 
 def joint_friction_nm(robot: Robot) -> dict[str, float]:
-    """Return the Coulomb friction [Nm or N] of joints by name, of those that have the effect."""
+    """Return the Coulomb friction [Nm or N], by name, of the joints that have this effect."""
     out = {}
     for effect in robot.effects:
         if effect.name == DRY_FRICTION[0] and effect.axis is not None:

@@ -1,4 +1,4 @@
-"""A robot as a MuJoCo model: gears as two joints in series, rotors as armature."""
+"""Export a robot as a MuJoCo model: elastic gears as two joints in series, rotors as armature."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from axisight.robot_export.dry_friction import joint_friction_nm
 Array = NDArray[np.float64]
 
 MOTOR = "motor of "
-"""What the joint of a motor on an elastic gear is called before the name of the driven joint."""
+"""Prefix, before the name of the driven joint, for the joint of a motor on an elastic gear."""
 
 
 def to_mujoco(robot: Robot) -> Any:
-    """Return the ``mujoco.MjModel`` of `mjcf`. Raises MissingExtraError without MuJoCo."""
+    """Return the ``mujoco.MjModel`` of `mjcf`; raise MissingExtraError if MuJoCo is not installed."""
     try:
         mujoco = import_module("mujoco")
     except ImportError as error:
@@ -31,14 +31,17 @@ def to_mujoco(robot: Robot) -> Any:
 
 
 def mjcf(robot: Robot) -> str:
-    """Return a robot as an MJCF text, angles as its own.
+    """Return a robot as MJCF text, with the same joint angles.
 
-    A driven joint with a rigid gear is a hinge (or slide) with the rotor as ``armature``, J_m / r^2, viscous
-    friction as ``damping``, F_v / r^2, and Coulomb friction as ``frictionloss``. One with an elastic gear is two in
-    series: ``motor of NAME``, the motor angle times r with what the drive has, and NAME with stiffness and
-    damping of the gear, whose angle is that of the arm minus the motor's. Motors take motor torque [Nm].
-    Massless links share a body with the next. Ripples, backlash and all other effects, and the
-    controller, have no place there.
+    - A driven joint with a rigid gear becomes a hinge (or slide). It has the rotor as ``armature``,
+      J_m / r^2, viscous friction as ``damping``, F_v / r^2, and Coulomb friction as ``frictionloss``.
+    - A driven joint with an elastic gear becomes two joints in series. ``motor of NAME`` has the motor angle
+      times r and the drive. NAME has the stiffness and damping of the gear, and its angle is the joint angle
+      minus the motor angle times r.
+    - The inputs of the actuators are motor torques [Nm].
+    - A massless link shares a body with the next link.
+
+    MJCF has no place for the controller and all other effects, such as ripples and backlash.
     """
     root = ET.Element("mujoco", model=robot.name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="false")
@@ -64,7 +67,7 @@ def mjcf(robot: Robot) -> str:
 
 
 def _body(parent: ET.Element, joints: Sequence[Joint], friction: dict[str, float]) -> ET.Element:
-    """Append the body that several joints, all but the last without a link, move; return it."""
+    """Append and return the body that these joints move; only the last joint has a link."""
     last = joints[-1]
     assert last.link is not None
     origin = np.sum([joint.origin_m for joint in joints], axis=0)

@@ -1,4 +1,4 @@
-"""A robot as a ``pinocchio.Model``."""
+"""Export a robot as a ``pinocchio.Model``."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from axisight.robot_export.dry_friction import joint_friction_nm
 
 
 def to_pinocchio(robot: Robot) -> Any:
-    """Return a ``pinocchio.Model`` of the arm: all joints, driven and elastic, by their names.
+    """Return a ``pinocchio.Model`` of the arm with all joints, driven and elastic, under the same names.
 
-    Its ``rnea`` is `Robot.inverse_dynamics`. Rotors stand in ``rotorInertia`` [kg m^2, motor side] and
-    ``rotorGearRatio`` (motor per joint angle), viscous friction in ``damping`` and Coulomb friction
-    in the limits of dry friction, both on the joint. Springs of gears and of elastic joints, the
-    controller and all other effects of the robot have no place there. Raises MissingExtraError without Pinocchio.
+    Its ``rnea`` equals `Robot.inverse_dynamics`. Rotors are in ``rotorInertia`` [kg m^2, motor side] and
+    ``rotorGearRatio`` (motor angle per joint angle). Viscous friction is in ``damping``, Coulomb friction in
+    the limits of dry friction, both joint-side. The model has no place for springs of gears and elastic
+    joints, the controller and all other effects. Raises MissingExtraError if Pinocchio is not installed.
     """
     try:
         pinocchio = import_module("pinocchio")

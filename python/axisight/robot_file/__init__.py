@@ -1,7 +1,6 @@
-"""Identified values in robot files: written back with their uncertainty, and read again.
+"""Write identified values with their uncertainty into robot files, and read them again.
 
-Apart from `axisight.robot`, because it stands above the fits: they use robots, and what
-they find is written here.
+This is not part of `axisight.robot`, because it uses the fits, and the fits use robots.
 """
 
 from axisight.robot_file.document import (

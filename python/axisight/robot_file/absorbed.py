@@ -1,4 +1,4 @@
-"""Which effects of a robot an identified quantity has taken up: on top of it they count twice."""
+"""Find the effects that an identified quantity contains already; in the file they would count twice."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ def absorbed_effects(
     axis: int | None,
     found: Iterable[Effect] = (),
 ) -> list[Effect]:
-    """Return those of the ``effects`` that identified ``quantities`` have taken up.
+    """Return those of the ``effects`` that identified ``quantities`` contain already.
 
-    ``quantities`` are those of `EffectInfo.absorbed_by`, identified for ``axis`` (from 1), None for
-    the whole arm: its links take up effects of every axis. Effects in ``found`` stand for
-    themselves, and those that are neutral stay. All that is found from commanded torques is in
-    units of these: the quantity ``torque``.
+    ``quantities`` are words of `EffectInfo.absorbed_by`. They were identified for ``axis`` (from 1), or with
+    None for the whole arm, whose links absorb effects of every axis. Effects in ``found`` were identified
+    themselves and stay, and so do neutral effects. The quantity ``torque`` is for results in units of the
+    commanded torque.
     """
     wanted = set(quantities)
     labels = {effect.label for effect in found}
@@ -34,6 +34,6 @@ def absorbed_effects(
 
 
 def absorbed_note(effects: Iterable[Effect]) -> list[str]:
-    """Return the note that says which effects were removed, none if there are none."""
+    """Return a note on the effects that were removed, as a list of one; [] without effects."""
     what = ", ".join(effect.label for effect in effects)
     return [f"removed, what was identified stands in their place: {what}"] if what else []

@@ -1,4 +1,4 @@
-"""What a robot file and its sidecar must not say: impossible effects, contradictions, no covariance."""
+"""Refuse impossible effects, contradictions and wrong covariances in robot files and sidecars."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ from axisight.errors import InputError, RobotError
 
 Array = NDArray[np.float64]
 
-# Share of its largest eigenvalue by which rounding, of transformed covariances too, may make the
-# least one of a correlation matrix negative.
+# Rounding may make the least eigenvalue of a correlation matrix negative by this share of the largest one,
+# also if the covariance was transformed.
 ROUNDING = 1e-6
 
 
 def check_effects(effects: Iterable[Effect], n_axes: int) -> None:
-    """Check that a robot of ``n_axes`` axes can have these effects.
+    """Raise an error unless a robot of ``n_axes`` axes can have these effects.
 
-    Raises InputError for axes that the robot does not have or an effect that has none,
-    RobotError for parameters outside the bounds of the table of effects (negative Coulomb
-    friction).
+    This is InputError for axes that the robot or the effect does not have, and RobotError for parameters
+    outside the bounds in the table of effects (such as negative Coulomb friction).
     """
     for effect in effects:
         info = effect_info(effect.name)
@@ -45,7 +44,7 @@ def check_effects(effects: Iterable[Effect], n_axes: int) -> None:
         given = effect.parameters or {}
         for p in info.parameters:
             value = given.get(p.name, p.neutral)
-            # Written so that NaN is refused.
+            # Not `value < lower or value > upper`, which accepts NaN.
             if not p.lower <= value <= p.upper:
                 raise RobotError(
                     f"effects: {effect.label}.{p.name}: expected {p.lower:g} to {p.upper:g} "
@@ -54,10 +53,7 @@ def check_effects(effects: Iterable[Effect], n_axes: int) -> None:
 
 
 def check_agreement(names: Sequence[str], values: Array, effects: Iterable[Effect]) -> None:
-    """Check that values of effect parameters are those that the effects themselves have.
-
-    Raises InputError naming the first that is not.
-    """
+    """Raise InputError, naming the first, if values differ from the parameters of the effects themselves."""
     found = dict(zip(names, values.tolist(), strict=True))
     for effect in effects:
         given = effect.parameters or {}
@@ -71,7 +67,7 @@ def check_agreement(names: Sequence[str], values: Array, effects: Iterable[Effec
 
 
 def checked_covariance(value: ArrayLike, n: int) -> Array:
-    """Return a covariance (n, n); raises InputError unless symmetric and positive semidefinite."""
+    """Return a covariance (n, n); raise InputError unless it is symmetric and positive semidefinite."""
     matrix = np.asarray(value, np.float64)
     if matrix.shape != (n, n) or not np.isfinite(matrix).all():
         raise InputError(

@@ -1,11 +1,11 @@
-"""Robots written back with what was identified, and read again.
+"""Write robots with identified values, and read them again.
 
-The robot file says what a robot is, effects included, and no more: its format is a contract that
-refuses keys it does not know. What is known besides:
+The robot file describes the robot with its effects only, because its format refuses unknown keys. The
+uncertainty is stored in two other places:
 
-- comments in the robot file, ``# identified: ...``, above the line of each value: for people;
-- a JSON file ``<name>.identified.json`` beside it, schema ``axisight.identified/2``: values,
-  standard errors, covariance, and where they come from: for programs.
+- For people: a comment ``# identified: ...`` in the robot file above the line of each value.
+- For programs: a JSON file ``<name>.identified.json`` beside it, schema ``axisight.identified/2``, with
+  values, standard errors, covariance and provenance.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _PLACES: dict[str, tuple[tuple[str | int, ...], str]] = {
     "motor_inertia": (("drive", "motor_inertia"), "kg m^2"),
     "viscous_friction": (("drive", "viscous_friction"), "Nm s/rad"),
 }
-# Units of gains, which are no parameters of a robot, by kind of controller; others have none that are found.
+# Units of the gains that a fit can find, by kind of controller; gains are not parameters of the robot.
 _GAINS: Mapping[str, Mapping[str, str]] = {
     "pd_position": {"kp": "Nm/rad", "kd": "Nm s/rad"},
     "cascade_position": {"kv": "1/s", "kp": "Nm s/rad", "ki": "Nm/rad"},
@@ -59,7 +59,7 @@ _HEADER = "# identified by axisight"
 
 
 def hash_file(path: Path | str) -> str:
-    """Return the SHA-256 of a file, hexadecimal. Raises InputError if it cannot be read."""
+    """Return the SHA-256 of a file in hexadecimal; raise InputError if the file cannot be read."""
     try:
         return hashlib.sha256(Path(path).read_bytes()).hexdigest()
     except OSError as error:
@@ -73,27 +73,27 @@ def write_identified(
     *,
     overwrite: bool = False,
 ) -> Path:
-    """Write a robot with identified values and, beside it, all that is known of them.
+    """Write a robot with identified values and a sidecar with their uncertainty; return the sidecar's path.
 
     source
-        The robot the values belong to: a file, the name of a preset, or a Robot. Text that no value
-        replaces stays as it is, comments and number formats included; a value equal to
-        the old one keeps its text too. Effects become tables ``[[effect]]``, and the file one of
-        ``axisight.robot/2``, if there are any: those that the robot has and those found, which
-        take the place of its own of the same name and axis; ``found.removed`` are left out.
+        The robot of the values: a file, the name of a preset, or a Robot. All text without a new value stays,
+        with comments and number formats; a value equal to the old one also keeps its text. Effects become
+        tables ``[[effect]]``, and a file with effects becomes ``axisight.robot/2``. Effects found replace the
+        robot's effects of the same name and axis; ``found.removed`` are left out.
     target
         File to write; the sidecar is ``<stem>.identified.json`` in the same folder.
     found
         Values from `identified`. ``<joint>.inertia_scale`` multiplies the inertia in ``source``.
     overwrite
-        Replace files that exist.
+        Whether to replace files that exist.
 
-    Returns the path of the sidecar. Each file is written whole or not at all, the sidecar first, whose
-    hash of the robot tells whether both belong together. Raises RobotError for values no body has
-    (mass or stiffness not positive, negative damping or friction, Coulomb friction of effects
-    included, an inertia that is not positive definite or breaks the triangle inequality),
-    InputError for unknown names, axes the robot does not have, values that their effect
-    contradicts, a covariance that is none, and files in the way.
+    Each file is written whole or not at all, the sidecar first. The sidecar holds the hash of the robot file,
+    which shows whether both belong together.
+
+    Raises RobotError for values that no body has: mass or stiffness that is not positive, negative damping or
+    friction (Coulomb friction of effects included), an inertia that is not positive definite or breaks the
+    triangle inequality. Raises InputError for unknown names, axes that the robot does not have, values that
+    differ from their effect, an invalid covariance, and files that exist.
     """
     robot = source if isinstance(source, Robot) else load_robot(source)
     check_effects(_all_effects(robot, found), robot.n_axes)
@@ -123,9 +123,9 @@ def write_identified(
 
 
 def render(robot: Robot, found: Identified, sidecar_name: str) -> str:
-    """Return the text of ``robot`` with the values ``found`` in it, checked by reading it.
+    """Return the text of ``robot`` with the values ``found``, verified by reading it back.
 
-    ``sidecar_name`` is named in the head comment.
+    The head comment refers to ``sidecar_name``.
     """
     effects = _all_effects(robot, found)
     text = stated(robot.toml, effects)
@@ -139,7 +139,7 @@ def render(robot: Robot, found: Identified, sidecar_name: str) -> str:
 
 
 def _all_effects(robot: Robot, found: Identified) -> list[Effect]:
-    """Return the effects found, and those the robot keeps with what was found of them."""
+    """Return the effects found, and those that the robot keeps, updated by the values found."""
     gone = {effect.label for effect in (*found.effects, *found.removed)}
     kept = []
     for effect in robot.effects:
@@ -155,7 +155,7 @@ def _all_effects(robot: Robot, found: Identified) -> list[Effect]:
 def _changes(
     robot: Robot, document: dict[str, Any], found: Identified
 ) -> tuple[dict[Key, float], dict[Key, list[str]]]:
-    """Return new values and comments by the place they belong to."""
+    """Return new values and comments by their place in the document."""
     changes: dict[Key, float] = {}
     notes: dict[Key, list[str]] = {}
     stands = _effect_places(document)
@@ -207,19 +207,19 @@ def _changes(
 
 
 def _gain_place(robot: Robot, document: dict[str, Any], name: str) -> tuple[Key, str] | None:
-    """Return place and unit of a gain of targets by its name (``j1.kp``); None of anything else."""
+    """Return place and unit of a gain of a position controller by name (``j1.kp``); None for other names."""
     joint, _, gain = name.rpartition(".")
     units = _OF_COMPUTED_TORQUE if robot.computed_torque else _GAINS.get(robot.controller_kind, {})
-    # A cascade without an integral need not state its gain.
+    # The document may lack the gain: a cascade without an integral need not state it.
     if gain not in units or gain not in document["controller"] or joint not in robot.axis_names:
         return None
     return ("controller", gain, robot.axis_names.index(joint)), units[gain]
 
 
 def _effect_places(document: dict[str, Any]) -> dict[str, tuple[Key, str]]:
-    """Return place and unit of every parameter of an effect by its name in `Identified`.
+    """Return place and unit of every effect parameter by its name in `Identified`.
 
-    A parameter that is left out, at its neutral value, stands where the name of the effect is.
+    The place of a parameter that the file leaves out, as it is neutral, is the name of its effect.
     """
     out: dict[str, tuple[Key, str]] = {}
     for i, effect in enumerate(stated_effects(document)):
@@ -268,7 +268,7 @@ def _refuse_inertia(document: dict[str, Any], changes: dict[Key, float], joint: 
         raise RobotError(
             f"{name}.inertia: expected a positive definite inertia, got principal moments {moments}"
         )
-    # A rod has equality, which rounding may break.
+    # For a thin rod both sides are equal, so rounding may break the inequality.
     if moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
         raise RobotError(
             f"{name}.inertia: expected no principal moment above the sum of the others (no mass is "
@@ -279,7 +279,7 @@ def _refuse_inertia(document: dict[str, Any], changes: dict[Key, float], joint: 
 def _check(
     text: str, before: dict[str, Any], changes: dict[Key, float], effects: list[Effect]
 ) -> None:
-    """Read the text back: it says what it should, bit for bit, and the robot loads."""
+    """Raise RobotError unless the text, read back, has exactly the wanted values and effects."""
     wanted = before
     for key, value in changes.items():
         wanted = _replaced(wanted, key, value)
@@ -318,10 +318,10 @@ def _note(name: str, value: float, error: float, unit: str, old: float | None) -
 
 
 def _without_old(text: str, found: Identified) -> str:
-    """Drop comments of an earlier identification of the same parameters, and the old head."""
+    """Return the text without the old head and without earlier comments on the same parameters."""
     kept, seen = [], set()
     names = set(found.names)
-    # From below: the comment nearest to the value is the new one.
+    # Upwards, because the comment nearest to the value is the new one.
     for line in reversed(text.splitlines(keepends=True)):
         bare = line.strip()
         if bare.startswith(_HEADER):
@@ -349,13 +349,14 @@ def load_identified(path: Path | str, *, check: bool = True) -> Identified:
     path
         The robot file, or its sidecar.
     check
-        Raise if the robot file is not the one the sidecar was written with (edited since);
-        False takes both as they are.
+        Whether to raise InputError if the robot file was edited after the sidecar was written.
 
-    ``effects`` are those of the ``robot``. A sidecar of version 1 holds effects that its robot file
-    cannot state: the robot has them too, and `write_identified` states them. Raises InputError for
-    files that are missing, of another schema, or do not belong together, RobotError for the robot and
-    impossible effects.
+    ``effects`` of the result are those of its ``robot``. A sidecar of version 1 holds effects that its robot
+    file cannot state. The robot of the result has these effects as well, and `write_identified` states them
+    in the robot file.
+
+    Raises InputError for files that are missing, of another schema, or do not belong together. Raises
+    RobotError for a faulty robot and for impossible effects.
     """
     given = Path(path)
     sidecar = given if given.name.endswith(".identified.json") else sidecar_path(given)

@@ -1,4 +1,4 @@
-"""Sidecars of version 1: they hold effects that belong into the robot file now."""
+"""Sidecars of version 1, which hold effects that version 2 states in the robot file."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from axisight.robot_file.sidecar import Earlier, Sidecar, read_sidecar, sidecar_
 
 
 def with_earlier_effects(robot: Robot, report: Sidecar | Earlier) -> Robot:
-    """Return the robot of a sidecar, with the effects in one of version 1.
+    """Return a robot with the effects of its sidecar, if that is of version 1.
 
-    A robot file that states effects was written since: it has the last word. Raises RobotError
-    and InputError for effects that the robot cannot have.
+    Effects in the robot file take precedence, because such a file is newer than the sidecar. Raises
+    RobotError and InputError for effects that the robot cannot have.
     """
     if isinstance(report, Sidecar) or robot.effects:
         return robot
@@ -26,10 +26,10 @@ def with_earlier_effects(robot: Robot, report: Sidecar | Earlier) -> Robot:
 
 
 def refuse_effects_beside(source: Path | str, robot: Robot) -> None:
-    """Refuse a robot whose effects stand in a sidecar of version 1: it would go without them.
+    """Raise InputError if the effects of a robot are in a sidecar of version 1, where nothing reads them.
 
-    ``source`` is the file of the ``robot``, or the name of a preset. Raises InputError that says how
-    to bring them into the robot file. A sidecar that cannot be read takes nothing from the robot.
+    ``source`` is the file of the ``robot``, or the name of a preset. The message says how to move the effects
+    into the robot file. A sidecar that cannot be read is ignored.
     """
     path = sidecar_path(source)
     if robot.effects or (isinstance(source, str) and source in PRESETS) or not path.is_file():

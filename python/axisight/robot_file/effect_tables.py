@@ -1,7 +1,7 @@
-"""Effects stated in the text of a robot file: tables ``[[effect]]`` added, changed and removed.
+"""Add, change and remove tables ``[[effect]]`` in the text of a robot file.
 
-Works on whole lines, so that comments and all other text stay; whoever edits so compares what the
-text says before and after.
+The edits work on whole lines, so that comments and all other text stay. Line edits can fail on unusual TOML,
+so `stated` parses its result and compares it with what was wanted.
 """
 
 from __future__ import annotations
@@ -21,15 +21,14 @@ _SCHEMA = re.compile(r"""^([ \t]*["']?schema["']?[ \t]*=[ \t]*["']axisight\.robo
 
 
 def stated(text: str, effects: Sequence[Effect]) -> str:
-    """Return the text of a robot with ``effects`` in it, and no others.
+    """Return the text of a robot file that states exactly these ``effects``.
 
-    Tables that need no change keep their text and their order; values that differ are replaced by
-    `changed_numbers`, parameters that are missing come below the others. New effects go behind
-    the last one. A text with nothing to add or remove is returned as it is; another becomes one of
-    ``axisight.robot/2``.
+    Existing tables keep their order and their text, except for values that differ: `changed_numbers` lists
+    those to replace. Missing parameters are added below the others, new effects after the last one. A text
+    with nothing to add or remove is returned unchanged; every other becomes ``axisight.robot/2``.
 
-    Raises RobotError where effects cannot be added or removed, because they stand otherwise than in
-    tables ``[[effect]]``.
+    Raises RobotError if effects cannot be added or removed, because the text does not state them as tables
+    ``[[effect]]``.
     """
     present = stated_effects(tomllib.loads(text))
     wanted = {effect.label: effect for effect in effects}
@@ -45,7 +44,7 @@ def stated(text: str, effects: Sequence[Effect]) -> str:
     if len(places) != len(present):
         raise RobotError("source: expected effects in tables [[effect]] with a line for each value")
     last = places[-1][1] if places else len(lines)
-    # From below, so that the places of those above stay.
+    # Upwards, so that the line numbers of earlier tables stay valid.
     added = [line + end for effect in new for line in ("", *_table(effect))]
     lines[last:last] = added
     for (first, after), below in reversed(list(zip(places, more, strict=True))):
@@ -79,7 +78,7 @@ def stated_effects(document: Mapping[str, Any]) -> list[Effect]:
 def changed_numbers(
     document: Mapping[str, Any], effects: Sequence[Effect]
 ) -> dict[tuple[str | int, ...], float]:
-    """Return the parameters to replace by their place, for the document of a text from `stated`."""
+    """Return the effect parameters to replace, by their place in the document of a text from `stated`."""
     wanted = {effect.label: effect for effect in effects}
     out: dict[tuple[str | int, ...], float] = {}
     for i, effect in enumerate(stated_effects(document)):
@@ -95,7 +94,7 @@ def _others(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _places(lines: Sequence[str]) -> Iterator[tuple[int, int]]:
-    """Yield the first line of every table of an effect and the one after its last value."""
+    """Yield, for every table of an effect, the first line and the line after its last value."""
     first = None
     after = 0
     for i, line in enumerate(lines):
@@ -125,7 +124,7 @@ def _table(effect: Effect) -> list[str]:
 
 
 def _missing(present: Effect, wanted: Effect) -> list[str]:
-    """Return lines of the parameters that a table leaves out and that are not neutral."""
+    """Return lines for the parameters that are not neutral and that a table leaves out."""
     neutral = {p.name: p.neutral for p in effect_info(wanted.name).parameters}
     return [
         f"{name} = {value!r}"

@@ -1,4 +1,4 @@
-"""Identified values with their uncertainty and where they come from."""
+"""Identified values with their uncertainty and provenance."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ Array = NDArray[np.float64]
 @summarized
 @dataclass(frozen=True)
 class Provenance:
-    """Where identified values come from.
+    """The origin of identified values.
 
-    ``method`` in words; ``data`` maps the names of logs to SHA-256 hashes of their files (see
-    `hash_file`), ``settings`` whatever the method was told, JSON types; ``created`` UTC.
+    ``method`` is a description in words. ``data`` maps the names of logs to SHA-256 hashes of their files
+    (see `hash_file`). ``settings`` are the settings of the method, in JSON types. ``created`` is the time in
+    UTC. `write_identified` fills in ``created`` and ``axisight_version`` if they are not set.
     """
 
     method: str
@@ -44,14 +45,17 @@ class Provenance:
 class Identified:
     """Identified values with their uncertainty and provenance.
 
-    ``names`` are those of `axisight.robot_parameters` (``axis1.stiffness``), with
-    ``<joint>.inertia_xx`` to ``_yz`` for link inertias about the centre of mass, link axes,
-    ``<joint>.origin_x`` to ``_z`` and ``<joint>.axis_x`` to ``_z`` for where joints are;
-    ``<joint>.kp`` and ``.kd`` for gains of a controller of targets, of a cascade ``.kv``, ``.kp`` and ``.ki``; and
-    ``<effect label>.<parameter>`` for effects, of those found or of those that the robot has.
-    ``values`` in SI units; ``standard_errors`` NaN where unknown; ``covariance`` over ``names``
-    or None. ``effects`` are those found; they take the place of those of the robot with the same
-    name and axis. ``removed`` are those of the robot that the values stand in the place of.
+    ``names`` (n of them) are:
+
+    - those of `axisight.robot_parameters` (``axis1.stiffness``);
+    - ``<joint>.inertia_xx`` to ``_yz``, the link inertia about the centre of mass, in link axes;
+    - ``<joint>.origin_x`` to ``_z`` and ``<joint>.axis_x`` to ``_z``, the geometry of joints;
+    - ``<joint>.kp`` and ``.kd``, gains of a position controller; ``.kv``, ``.kp`` and ``.ki`` of a cascade;
+    - ``<effect label>.<parameter>``, for effects found and effects of the robot.
+
+    ``values`` (n,) are in SI units, ``standard_errors`` (n,) are NaN if unknown, ``covariance`` is (n, n) or
+    None. ``effects`` are those found; they replace the robot's effects of the same name and axis. ``removed``
+    are effects of the robot that the values contain already, so that they must leave its file.
     """
 
     names: tuple[str, ...]
@@ -64,7 +68,7 @@ class Identified:
     removed: tuple[Effect, ...] = ()
 
     def value(self, name: str) -> float:
-        """Return one value; raises InputError for a name that was not identified."""
+        """Return the value of a ``name`` (SI units); raise InputError for a name that was not identified."""
         one_of("name", name, self.names)
         return float(self.values[self.names.index(name)])
 
@@ -78,24 +82,24 @@ def identified(
     effects: Sequence[Effect] = (),
     removed: Sequence[Effect] = (),
 ) -> Identified:
-    """Return identified values, checked.
+    """Return identified values after checking them.
 
     values
-        By name, SI units.
+        Values by name (see `Identified`), in SI units.
     provenance
-        Where they come from.
+        Origin of the values.
     standard_errors
-        By name; by default from ``covariance``, NaN without.
+        Standard errors by name, in SI units; by default from ``covariance``, or NaN without one.
     covariance
-        (n, n) in the order of ``values``.
+        Covariance (n, n) in the order of ``values``.
     effects
         Effects found, with their parameters.
     removed
-        Effects of the robot that the values have taken up: they leave its file.
+        Effects of the robot that the values contain already, so that they must leave its file.
 
-    Raises InputError for values that are not finite, negative standard errors, a covariance
-    that is not symmetric and positive semidefinite, of another size, or at odds with the standard
-    errors, and values of effect parameters that ``effects`` contradict.
+    Raises InputError for values that are not finite and for negative standard errors. Raises InputError for a
+    covariance that is not symmetric and positive semidefinite, has another size, or contradicts the standard
+    errors. Raises InputError if values of effect parameters differ from those in ``effects``.
     """
     names = tuple(values)
     numbers = np.array([_number(f"values[{n!r}]", values[n]) for n in names])
@@ -125,11 +129,11 @@ def identified(
 def identified_by_fit(
     fitted: Fitted, provenance: Provenance, *, effects: Sequence[Effect] = ()
 ) -> Identified:
-    """Return what `axisight.fit` found, ready to be written.
+    """Return the result of `axisight.fit` as identified values for `write_identified`.
 
-    ``fitted`` gives values, standard errors and, where it is finite, the covariance; ``effects``
-    are those that were fitted along, to which its effect parameters are written; ``provenance`` as
-    in `identified`. Raises InputError for an effect parameter without its effect.
+    ``fitted`` gives the values, the standard errors and, if it is finite, the covariance. ``effects`` are the
+    effects that were fitted as well; they get the fitted parameters. ``provenance`` is as in `identified`.
+    Raises InputError for an effect parameter without its effect, and as `identified`.
     """
     values = dict(zip(fitted.names, fitted.values.tolist(), strict=True))
     updated = []

@@ -1,4 +1,4 @@
-"""The file beside a written robot, schema ``axisight.identified/2``; version 1 is read too."""
+"""The sidecar, the JSON file beside a written robot: schema ``axisight.identified/2``, or 1 for reading."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SCHEMA: Literal["axisight.identified/2"] = "axisight.identified/2"
 
 
 class Strict(BaseModel):
-    """Unknown keys and wrong types are refused."""
+    """A model that refuses unknown keys and wrong types."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -40,7 +40,7 @@ class EffectEntry(Strict):
 
 
 class SourceEntry(Strict):
-    """Where the values come from."""
+    """The origin of the values, as `Provenance`."""
 
     method: str
     data: dict[str, str]
@@ -51,9 +51,9 @@ class SourceEntry(Strict):
 
 
 class Content(Strict):
-    """What the file says in every version."""
+    """The content that both versions share."""
 
-    # The name `schema` is taken by pydantic itself; the file says "schema".
+    # pydantic itself uses the name `schema`; the key in the file is "schema".
     model_config = ConfigDict(extra="forbid", strict=True, populate_by_name=True)
     format: str = Field(alias="schema")
     robot: str
@@ -65,20 +65,23 @@ class Content(Strict):
 
 
 class Earlier(Content):
-    """The file of version 1: it held effects, which robot files could not state."""
+    """The sidecar of version 1, which holds effects because robot files could not state them."""
 
     format: Literal["axisight.identified/1"] = Field(alias="schema")
     effects: list[EffectEntry]
 
 
 class Sidecar(Content):
-    """The file."""
+    """The sidecar of version 2."""
 
     format: Literal["axisight.identified/2"] = Field(alias="schema")
 
     @classmethod
     def of(cls, found: Identified, robot: Robot, text: str, name: str) -> Sidecar:
-        """Return the sidecar of a robot that was written as ``text`` under ``name``."""
+        """Return the sidecar of a robot written as ``text`` to a file ``name``.
+
+        Raises InputError for a provenance that the schema does not allow.
+        """
         given = found.provenance
         created = given.created.isoformat() if given.created else ""
         try:
@@ -108,13 +111,13 @@ class Sidecar(Content):
 
 
 def sidecar_path(robot_file: Path | str) -> Path:
-    """Return the path of the sidecar of ``robot_file``."""
+    """Return the path of the sidecar of ``robot_file``: ``<stem>.identified.json`` in its folder."""
     path = Path(robot_file)
     return path.with_name(f"{path.stem}.identified.json")
 
 
 def read_sidecar(path: Path) -> Sidecar | Earlier:
-    """Return the content of a sidecar; raises InputError naming file and field."""
+    """Return the content of a sidecar of either version; raise InputError naming file and field."""
     try:
         text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
@@ -135,12 +138,12 @@ def _is_earlier(text: str) -> bool:
 
 
 def known(number: float) -> float | None:
-    """Return a number, None for one that is not finite."""
+    """Return a number, or None if it is not finite."""
     return float(number) if np.isfinite(number) else None
 
 
 def first_fault(error: ValidationError) -> str:
-    """Return the first fault with its place."""
+    """Return the text of the first fault, with its place."""
     item = error.errors()[0]
     where = ".".join(str(part) for part in item["loc"]) or "file"
     return f"{where}: {item['msg']}"

@@ -1,4 +1,4 @@
-"""Numbers replaced and comments added in a TOML document, every other character kept."""
+"""Replace numbers and add comments in a TOML document, and keep every other character."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ Key = tuple[str | int, ...]
 
 
 def edited(text: str, numbers: Mapping[Key, float], comments: Mapping[Key, Sequence[str]]) -> str:
-    """Return ``text`` with other numbers at some places, and comments above some statements.
+    """Return ``text`` with new numbers at some places, and comments above some statements.
 
     numbers
-        By place: names of tables and keys; tables of an array and items of one count from 0.
-        A number equal to the old one keeps its text, and with it the sign of zero counts.
+        Numbers by place: names of tables and keys, and numbers from 0 for items and tables of an array.
+        A number equal to the old one keeps its text; 0.0 and -0.0 are not equal here.
     comments
-        Whole lines, from ``#`` on, by the place whose statement they go above, as far in as it.
+        Whole lines, beginning with ``#``, by place. They go above the statement of that place, with the same
+        indentation.
 
-    Raises RobotError for a text that cannot be kept as it is.
+    Raises RobotError for a text that is not TOML, or that tomlkit cannot reproduce exactly.
     """
     try:
         document = tomlkit.parse(text)
@@ -47,19 +48,19 @@ def edited(text: str, numbers: Mapping[Key, float], comments: Mapping[Key, Seque
 
 
 def same(a: float, b: float) -> bool:
-    """Whether two numbers are the same, sign of zero included."""
+    """Whether two numbers are equal, including the sign of zero."""
     return a == b and math.copysign(1, a) == math.copysign(1, b)
 
 
 def at(document: Any, place: Key) -> Any:
-    """Return what stands at a place of a document."""
+    """Return the value at a place of a document."""
     for part in place:
         document = document[part]
     return document
 
 
 def _statement(document: Any, place: Key) -> Any:
-    """Return the value that is written after ``key =`` and holds the place."""
+    """Return the value of the statement ``key = value`` that contains a place."""
     node = document
     for part in place:
         node = node[part]

@@ -1,4 +1,4 @@
-"""What all ways from a result into a robot file share: uncertainty carried along, and notes."""
+"""Shared steps from a result to identified values: propagate the uncertainty, and add notes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from axisight.robot_file.identified import Identified, Provenance, identified
 Array = NDArray[np.float64]
 
 UNPLACED = "no_place"
-"""Key of the settings that holds what was found and has no place in a robot file."""
+"""Key in the settings for results that a robot file cannot state."""
 
 
 def values_of(
@@ -28,11 +28,11 @@ def values_of(
     effects: Iterable[Effect] = (),
     removed: Iterable[Effect] = (),
 ) -> Identified:
-    """Return ``values`` with the covariance of what they were made from.
+    """Return identified ``values`` with the covariance propagated from the numbers they were computed from.
 
-    ``jacobian`` (len(values), n) are the derivatives by the n numbers of ``covariance`` (n, n); a row
-    of zeros is a value that was held. Where the covariance is not finite, the standard
-    errors that do not need those elements are kept, and the others are unknown.
+    ``jacobian`` (len(values), n) holds the derivatives by the n numbers of ``covariance`` (n, n); a row of
+    zeros is a fixed value. If the covariance is not finite, the result has no covariance, and only the
+    standard errors that do not depend on such elements.
     """
     spread = np.full((len(values), len(values)), np.nan)
     used = [np.flatnonzero(row) for row in jacobian]
@@ -58,7 +58,10 @@ def values_of(
 def noted(
     provenance: Provenance, notes: Iterable[str], unplaced: Mapping[str, Any] | None = None
 ) -> Provenance:
-    """Return ``provenance`` with more notes, a line each, and with what has no place."""
+    """Return ``provenance`` with more notes, one per line, and the ``unplaced`` results in its settings.
+
+    Raises InputError for an object that is not a `Provenance`.
+    """
     if not isinstance(provenance, Provenance):
         raise InputError(f"provenance: expected a Provenance, got {type(provenance).__name__}")
     text = "\n".join([*([provenance.notes] if provenance.notes else []), *notes])

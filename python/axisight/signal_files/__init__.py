@@ -1,4 +1,4 @@
-"""Signals of a diagnosis as files that plotting tools open: Parquet, MCAP."""
+"""Write the signals of a diagnosis to files for plotting tools: Parquet, MCAP."""
 
 from axisight.signal_files.target import check_target
 from axisight.signal_files.write import write_signals

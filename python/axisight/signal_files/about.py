@@ -1,4 +1,4 @@
-"""What is said beside signals: joints, units, how simulator and logs were compared."""
+"""Metadata of signal files: joints, units, and how simulator and logs were compared."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import xarray as xr
 
-# Of a log, not of all.
+# Attributes of single logs, which metadata of the whole file must not state.
 _OF_A_LOG = ("log", "role")
 
 
 def about(signals: Sequence[xr.Dataset]) -> str:
-    """Return the metadata of signals as JSON."""
+    """Return the metadata of the signals of all logs as JSON."""
     first = signals[0]
     said = {key: value for key, value in first.attrs.items() if key not in _OF_A_LOG}
     if "lowpass_hz" in said:

@@ -1,4 +1,4 @@
-"""Signals of all logs as an MCAP recording of joint states, which tools for ROS open as they are."""
+"""Write the signals of all logs as an MCAP recording of joint states, for tools of ROS."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from axisight.signal_files.about import about
 
 _STATE = "sensor_msgs/msg/JointState"
 _STRING = "std_msgs/msg/String"
-# A stamp of zero means none.
+# Not 0: in ROS a stamp of zero means no stamp.
 _START_NS = 1_000_000_000
 
 
 def recording(signals: Sequence[xr.Dataset]) -> bytes:
-    """Return an MCAP file of the signals; raises MissingExtraError without rosbags."""
+    """Return the bytes of an MCAP file of the signals; raise MissingExtraError without rosbags."""
     try:
         bags = import_module("rosbags.rosbag2")
         typesys = import_module("rosbags.typesys")
@@ -44,7 +44,7 @@ def recording(signals: Sequence[xr.Dataset]) -> bytes:
 
 
 def _write(writer: Any, types: Any, folder: str, data: xr.Dataset) -> None:
-    """Write the signals of a log, a topic for each."""
+    """Write the signals of a log, one topic per signal."""
     known = types.types
     joints = [str(name) for name in data["joint"].values]
     stamps = _START_NS + np.round(data["time_s"].values * 1e9).astype(np.int64)
@@ -52,7 +52,7 @@ def _write(writer: Any, types: Any, folder: str, data: xr.Dataset) -> None:
     for name in data.data_vars:
         topic = f"{folder}/{str(name).removesuffix('_torque_nm')}"
         connection = writer.add_connection(topic, _STATE, typestore=types)
-        # Row by row in memory: filtered signals may lie column by column, which no message takes.
+        # Messages need contiguous rows, but filtered signals may be stored by column.
         efforts = np.ascontiguousarray(data[name].values)
         for stamp, effort in zip(stamps.tolist(), efforts, strict=True):
             seconds, rest = divmod(stamp, 1_000_000_000)
@@ -63,9 +63,9 @@ def _write(writer: Any, types: Any, folder: str, data: xr.Dataset) -> None:
 
 
 def _folder(data: xr.Dataset, seen: set[str]) -> str:
-    """Return the name before the topics of a log, letters that topics have, none twice."""
+    """Return a unique prefix for the topics of a log, with characters that topics allow."""
     name = re.sub(r"\W", "_", str(data.attrs["log"]), flags=re.ASCII)
-    # A part of a topic begins with a letter.
+    # In ROS each part of a topic must begin with a letter.
     base = f"/{data.attrs['role']}/{name if name[:1].isalpha() else f'log_{name}'}"
     found, number = base, 1
     while found in seen:

@@ -1,4 +1,4 @@
-"""Signals of all logs as one Parquet table."""
+"""Write the signals of all logs as one Parquet table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from axisight.signal_files.about import about
 
 
 def table(signals: Sequence[xr.Dataset]) -> bytes:
-    """Return a Parquet file of the signals of all logs, one below the other."""
+    """Return the bytes of a Parquet file with the signals of all logs, one log below the other."""
     made = pa.concat_tables([_of_log(data) for data in signals])
     made = made.replace_schema_metadata({"axisight": about(signals)})
     out = pa.BufferOutputStream()

@@ -1,4 +1,4 @@
-"""Where signals may be written: said before the work."""
+"""Check before a diagnosis that its signals can be written."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ KINDS = (".parquet", ".mcap")
 def check_target(
     target: Path | str, *, overwrite: bool = False, inputs: Sequence[Path] = ()
 ) -> None:
-    """Raise InputError for a file that signals cannot be written to, MissingExtraError without its library.
+    """Raise an error if signals cannot be written to ``target``.
 
-    ``target`` has to end in .parquet or .mcap and to be a file that may be written, none of the ``inputs``;
-    with ``overwrite`` one that exists is no obstacle.
+    ``target`` must end in .parquet or .mcap, be writable, and be none of the ``inputs``. Without
+    ``overwrite`` it must not exist. Raises InputError for another ending, OutputError (an InputError) for a
+    file that cannot be written, and MissingExtraError for .mcap if rosbags is not installed.
     """
     path = Path(target)
     kind = path.suffix.lower()

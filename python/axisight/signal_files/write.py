@@ -1,4 +1,4 @@
-"""Signals into a file, by how its name ends."""
+"""Write signals to a file in the format of its suffix."""
 
 from __future__ import annotations
 
@@ -17,20 +17,25 @@ from axisight.storage import write_bytes
 def write_signals(
     signals: Sequence[xr.Dataset], target: Path | str, *, overwrite: bool = False
 ) -> Path:
-    """Write ``signals``, those of `Diagnosis.signals`, and return the file; it appears whole or not at all.
+    """Write ``signals`` and return the path of the file, which appears whole or not at all.
 
+    signals
+        The datasets of `Diagnosis.signals`, one per log.
     target
-        ``.parquet``: one table of all logs with the columns ``log``, ``role``, ``time_s`` and, by axis,
-        ``measured_torque_nm_1``, ``simulated_before_torque_nm_1`` and so on; names of joints, units and how
-        simulator and logs were compared stand in its metadata under ``axisight``, as JSON. ``.mcap``: topics
-        ``/ROLE/LOG/measured``, ``/ROLE/LOG/simulated_before``, ``simulated_after``, ``residual_before`` and
-        ``residual_after`` of ``sensor_msgs/JointState``, torques as effort by the names of joints; every log
-        begins at 1 s. What stands in the table's metadata is the message of ``/axisight``.
-    overwrite
-        Replace a file that exists.
+        File to write; its suffix chooses the format.
 
-    Raises InputError as `check_target`, and where there are no signals; MissingExtraError for ``.mcap`` without
-    rosbags.
+        ``.parquet`` is one table of all logs. Its columns are ``log``, ``role``, ``time_s`` [s] and, by axis
+        from 1, ``measured_torque_nm_1``, ``simulated_before_torque_nm_1`` and so on [Nm or N]. Its metadata
+        under ``axisight``, in JSON, hold the joint names, the units, and how simulator and logs were
+        compared.
+
+        ``.mcap`` has the topics ``/ROLE/LOG/measured``, ``simulated_before``, ``simulated_after``,
+        ``residual_before`` and ``residual_after`` of ``sensor_msgs/JointState``, with torques as effort by
+        joint name. Every log begins at 1 s. The topic ``/axisight`` has the same metadata as one message.
+    overwrite
+        Whether to replace a file that exists.
+
+    Raises InputError and MissingExtraError as `check_target`, and InputError without signals.
     """
     path = Path(target)
     check_target(path, overwrite=overwrite)

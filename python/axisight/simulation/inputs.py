@@ -1,4 +1,4 @@
-"""Checks of what drives a simulation."""
+"""Checks of the inputs of a simulation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 def one_input(
     robot: Robot, velocity_ref: ArrayLike | None, torque: ArrayLike | None, *, dims: int
 ) -> tuple[Array, bool]:
-    """Return the one input given, of ``dims`` dimensions, and whether it is a reference."""
+    """Return the only given input, of ``dims`` dimensions, and whether it is a reference."""
     if velocity_ref is not None and torque is None:
         return _array(robot, "velocity_ref_rad_s", velocity_ref, dims), True
     if torque is not None and velocity_ref is None:
@@ -23,7 +23,7 @@ def one_input(
 
 
 def _array(robot: Robot, field: str, value: ArrayLike, dims: int) -> Array:
-    """Return real numbers of ``dims`` dimensions, the last one of axes, none of them empty."""
+    """Return a checked real array of ``dims`` dimensions, none empty, the last one over axes."""
     runs = "" if dims == 2 else "n_runs, "
     expected = f"{field}: expected real numbers of shape ({runs}n, {robot.n_axes})"
     try:
@@ -49,7 +49,7 @@ def given_noise(
     seed: int | None,
     cutoff_hz: float | None,
 ) -> Array | None:
-    """Return the noise given, in the shape of the input."""
+    """Return the given noise in the shape of the input, None without."""
     if cutoff_hz is not None and seed is None:
         raise InputError(f"noise_cutoff_hz: expected a noise_seed with it, got {cutoff_hz} alone")
     if noise is None:
@@ -65,7 +65,7 @@ def given_noise(
 def start_angles(
     robot: Robot, start_rad: ArrayLike | None, n_runs: int
 ) -> list[list[float]] | None:
-    """Return the driven joint angles at rest, of all runs or run by run; None for the operating point."""
+    """Return the driven joint angles at rest, common or per run; None for the operating point."""
     if start_rad is None:
         return None
     start = np.asarray(start_rad)

@@ -1,4 +1,4 @@
-"""Noise of the position sensor, a function of seed and run."""
+"""Noise of the position sensor as a function of seed and run."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Generator and stream of the core's noise; a stream has 16 bits for the axis.
+# Ranges of seed and run: 64 bits each in the core, of which the run leaves 16 to the axis.
 _SEEDS, _RUNS = 1 << 64, 1 << 48
 
 
 def _check_stream(seed: int, run: int) -> None:
-    """Refuse numbers that the core cannot tell apart."""
+    """Raise InputError for a seed or run out of the core's range."""
     for field, value, count in (("seed", seed, _SEEDS), ("run", run, _RUNS)):
         if not 0 <= value < count:
             bits = count.bit_length() - 1
@@ -24,7 +24,10 @@ def _check_stream(seed: int, run: int) -> None:
 
 
 def white_noise(seed: int, run: int, n_samples: int, n_axes: int) -> Array:
-    """Return unit white Gaussian noise (n_samples, n_axes) as a function of (seed, run)."""
+    """Return unit white Gaussian noise (n_samples, n_axes), a function of (``seed``, ``run``).
+
+    Raises InputError for ``seed`` or ``run`` out of range. ``n_samples`` and ``n_axes`` set the shape.
+    """
     _check_stream(seed, run)
     return _core.measurement_noise(seed, run, n_samples, n_axes, 1.0)
 
@@ -34,8 +37,9 @@ def sensor_noise(
 ) -> Array:
     """Return position noise (n_samples, n_axes) [rad] of the robot's sensor.
 
-    A function of (seed, run) with the standard deviation of the sensor; white, or first
-    order with corner ``cutoff_hz``. Raises InputError for a cutoff that is not positive.
+    The noise is a function of (``seed``, ``run``) with the standard deviation of the sensor. It is
+    white, or of first order with corner ``cutoff_hz`` [Hz]. Raises InputError for a cutoff that is not
+    positive.
     """
     std = robot.position_noise_std
     if cutoff_hz is None:

@@ -1,4 +1,4 @@
-"""Closed-loop and torque-driven simulation: many runs at once, one as a batch of one."""
+"""Closed-loop and torque-driven simulation of many runs; a single run is a batch of one."""
 
 from __future__ import annotations
 
@@ -41,24 +41,25 @@ def simulate(
     tolerance: float = 1e-7,
     substeps: int = 1,
 ) -> xr.Dataset:
-    """Simulate from rest at an operating point, sampled as the controller samples.
+    """Return a simulation from rest at an operating point, at the controller's sample time.
 
     Parameters
     ----------
-    robot : the robot; effects that its file states take part.
-    velocity_ref_rad_s : (n, n_axes), motor-side references through the controller; or
-    torque_nm : (n, n_axes), commanded motor torques without controller. Give exactly one.
-    effects : further effects; one of the same name and axis as one of the robot replaces it.
-    noise_seed, run : position noise of the robot's sensor as a function of
+    robot : the robot, with the effects of its file.
+    velocity_ref_rad_s : (n, n_axes), motor-side references [rad/s] for the controller.
+    torque_nm : (n, n_axes), commanded motor torques [Nm] without controller. Give exactly one of
+        references and torques.
+    effects : further effects. An effect replaces one of the robot with the same name and axis.
+    noise_seed, run : seed and run of the position noise of the robot's sensor, a function of
         (seed, run); no noise without a seed.
-    noise : (n, n_axes) position noise [rad] instead of a seeded one.
-    noise_cutoff_hz : corner of a first-order spectrum of the seeded noise; white without.
-    position_resolution_rad : step of the position sensor, motor side; zero for none.
-    start_rad : (n_axes,) driven joint angles at rest; default the operating point.
-    model : ``"nonlinear"``, or ``"linear"``: linearized at the start, exactly sampled, with
-        ripple and the torque path as they are (thesis section 8.1).
+    noise : (n, n_axes) position noise [rad] instead of seeded noise.
+    noise_cutoff_hz : corner of a first-order spectrum of the seeded noise [Hz]; None for white noise.
+    position_resolution_rad : step of the position sensor [rad], motor side; zero for none.
+    start_rad : (n_axes,) driven joint angles at rest [rad]; default the operating point.
+    model : ``"nonlinear"``, or ``"linear"``: linearized at the start and exactly sampled, but with
+        nonlinear ripple and torque path (thesis section 8.1).
     method, tolerance, substeps : integrator of the nonlinear model, e.g. ``"dopri5"`` with a
-        tolerance or ``"rk4"`` with sub-steps; all of them: :class:`axisight.simulation.Integrator`.
+        tolerance or ``"rk4"`` with sub-steps; see :class:`axisight.simulation.Integrator`.
 
     Returns
     -------
@@ -66,9 +67,10 @@ def simulate(
     ``position_rad`` (measured), ``motor_position_rad`` and
     ``joint_position_rad`` (true), ``torque_disturbance_nm``,
     ``position_disturbance_rad``. ``attrs["status"]`` is ``completed``,
-    ``diverged`` or ``step_size_collapsed`` (an unstable loop ends as either); the arrays
-    then end at the sample that failed. The attributes also count the effort. Raises InputError
-    for wrong shapes, non-finite input, unknown effects or a missing controller.
+    ``diverged`` or ``step_size_collapsed`` (an unstable loop ends as either of these two, and the
+    arrays then end at the failed sample). Further attributes count steps and evaluations.
+
+    Raises InputError for wrong shapes, non-finite input, unknown effects or a missing controller.
 
     """
     out = _simulated(
@@ -117,30 +119,31 @@ def simulate_batch(
     substeps: int = 1,
     threads: int = 0,
 ) -> xr.Dataset:
-    """Simulate many runs of one robot: eight in lock-step per thread.
+    """Return the simulations of many runs of one robot, computed eight in lock-step per thread.
 
-    With fixed steps and with the linear model a run has the bits it has alone; with
-    an error-controlled method the eight take the shortest step any of them needs, so a run
-    differs from itself alone by what the tolerance allows. Implicit methods run one by one.
+    With fixed steps and with the linear model, a run has the same bits as alone. With an
+    error-controlled method, the eight runs take the shortest step that any of them needs, so a run
+    differs from the same run alone within the tolerance. Implicit methods run one by one.
 
     Parameters
     ----------
-    robot : the robot; effects that its file states take part.
-    velocity_ref_rad_s : (n_runs, n, n_axes), motor-side references; or
-    torque_nm : (n_runs, n, n_axes), commanded motor torques. Give exactly one.
+    robot : the robot, with the effects of its file.
+    velocity_ref_rad_s : (n_runs, n, n_axes), motor-side references [rad/s].
+    torque_nm : (n_runs, n, n_axes), commanded motor torques [Nm]. Give exactly one of references and
+        torques.
     noise_seed, first_run : the noise of run ``i`` is that of ``run=first_run + i``.
-    noise : (n_runs, n, n_axes) position noise [rad] instead of a seeded one.
-    threads : 0 takes every core. The result does not depend on it.
-    start_rad : (n_axes,) driven joint angles at rest, or (n_runs, n_axes), each run at its own; the
-        linear model has one start. Default the operating point.
+    noise : (n_runs, n, n_axes) position noise [rad] instead of seeded noise.
+    threads : number of threads, 0 for all cores. The result does not depend on it.
+    start_rad : (n_axes,) driven joint angles at rest [rad], or (n_runs, n_axes) for a start per run;
+        the linear model allows one start. Default the operating point.
     effects, noise_cutoff_hz, position_resolution_rad, model, method, tolerance, substeps : as in
     :func:`simulate`, the same for all runs.
 
     Returns
     -------
     Dataset with the variables of :func:`simulate` and a first dimension ``run``, and
-    ``status`` and ``stopped_at`` (run). Runs that failed are NaN from the sample after the
-    one that failed, and spoil no other. Raises InputError as :func:`simulate`.
+    ``status`` and ``stopped_at`` (run). A failed run is NaN after its failed sample and does not
+    affect the others. Raises InputError as :func:`simulate` does.
 
     """
     drive = one_input(robot, velocity_ref_rad_s, torque_nm, dims=3)
@@ -188,9 +191,10 @@ def _simulated(
     integrator: Integrator,
     threads: int,
 ) -> _core.BatchOutput:
-    """Simulate ``runs``, whose numbers rule the noise; ``drive`` as `one_input` gives it.
+    """Return the simulation of ``runs``, whose numbers determine the noise.
 
-    The input of a single run may lack the dimension of runs, and so the noise given.
+    ``drive`` is the result of `one_input`. The input of a single run, and given noise, may lack the
+    dimension of runs.
     """
     one_of("model", model, get_args(Model))
     data, reference = drive
@@ -219,7 +223,7 @@ def _simulated(
 _Counter = Literal[
     "evaluations", "steps", "rejections", "jacobians", "factorizations", "implicit_samples"
 ]
-# What a run cost: names of attributes, and of the compiled core.
+# Counters of effort: names of attributes, and names in the compiled core.
 _COUNTERS: dict[str, _Counter] = {
     "right_hand_sides": "evaluations",
     "steps": "steps",
@@ -249,7 +253,7 @@ _PER_AXIS: tuple[
 
 @cache
 def _version() -> str:
-    """Looking it up takes as long as a short run."""
+    """Return the version, cached because the look-up takes as long as a short run."""
     return version("axisight")
 
 
@@ -260,7 +264,7 @@ def _dataset(
     part: tuple[int | slice, ...],
     attrs: dict[str, Any],
 ) -> xr.Dataset:
-    """Return the signals, those of ``part`` of runs and samples."""
+    """Return the signals of the runs and samples that ``part`` selects."""
     variables = {
         name: ((*dims, "axis"), out[name][part], {"units": _UNITS[name.rsplit("_", 1)[1]]})
         for name in _PER_AXIS

@@ -1,4 +1,4 @@
-"""Statistics and linear algebra on results that several kinds of fits share.
+"""Statistics and linear algebra that several kinds of fits share.
 
-The lowest room of the fits: it imports nothing of the package but errors, and takes plain arrays.
+These modules import only errors from the package, and take plain arrays.
 """

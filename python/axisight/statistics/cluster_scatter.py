@@ -1,8 +1,8 @@
 """Covariance of a least-squares estimate from the scatter of clusters of equations.
 
-The sandwich: right whatever the residuals of one cluster have to do with each other, and whatever
-their variances. Each cluster's residuals are enlarged by what the fit has taken from them, so that
-it is unbiased where residuals are white (Bell and McCaffrey 2002, the correction called CR2).
+This is the sandwich covariance. It holds for any correlation of residuals within a cluster, and for any
+variances. The correction CR2 (Bell and McCaffrey 2002) enlarges each cluster's residuals by the part
+that the fit has absorbed, so that the covariance is unbiased for white residuals.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 
 DECIDED = 1e-8
-"""Share of a residual that the fit leaves, below which its cluster alone decides a direction."""
+"""A cluster alone decides a direction if the fit leaves less than this share of its residual."""
 
 LEAST_SHOWN = 0.5
-"""Share of its variance that the scatter of a parameter must show to be called its variance."""
+"""Least share of the variance of a parameter that its scatter must show."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClusterScatter:
-    """What clusters of equations say of an estimate.
+    """The scatter of clusters of equations about an estimate.
 
-    With the equations ``X_b p = y_b`` of cluster b, weights included, and a root
-    ``W W^T = (sum_b X_b^T X_b)^-1``:
+    Cluster b has the equations ``X_b p = y_b``, including weights. W is a root
+    ``W W^T = (sum_b X_b^T X_b)^-1``.
 
     root
         W, shape (n_parameters, n_columns).
@@ -36,8 +36,8 @@ class ClusterScatter:
     residual
         X_b p - y_b, shape (n_clusters, n_equations).
     score
-        What moves the estimate besides ``lever^T residual``, shape (n_clusters, n_columns), as
-        errors in the columns of X do; zero as a rule.
+        Contribution to the estimate besides ``lever^T residual``, shape (n_clusters, n_columns), for
+        example from errors in the columns of X; usually zero.
     """
 
     root: Real
@@ -47,7 +47,7 @@ class ClusterScatter:
 
     @cached_property
     def _enlarged(self) -> Real:
-        """(I - H_b)^(-1/2) of every cluster, zero where it alone decides."""
+        """(I - H_b)^(-1/2) of every cluster, zero for directions that it alone decides."""
         share = self.lever @ self.lever.swapaxes(-1, -2)
         values, vectors = np.linalg.eigh(np.eye(share.shape[-1]) - share)
         shows = values > DECIDED
@@ -60,7 +60,7 @@ class ClusterScatter:
 
     @cached_property
     def covariance(self) -> Real:
-        """Of the parameters, shape (n_parameters, n_parameters); NaN where it does not show."""
+        """Covariance (n_parameters, n_parameters), NaN for parameters whose variance does not show."""
         score = np.einsum("bij,bi->bj", self._pull, self.residual) + self.score
         change = score @ self.root.T
         found = np.asarray(change.T @ change, dtype=np.float64)
@@ -72,10 +72,10 @@ class ClusterScatter:
     def shown(self) -> NDArray[np.bool_]:
         """Whether the scatter of a parameter shows its variance, shape (n_parameters,).
 
-        It does not where there are as many equations as parameters, or where a single cluster
-        decides: its residuals are zero then and scatter no more.
+        It does not with as many equations as parameters, or if a single cluster decides the parameter,
+        because the residuals are then zero and do not scatter.
         """
-        # The mean of the scatter, were residuals white.
+        # The expected scatter for white residuals.
         moved = self._pull @ self.root.T
         left = moved - self.lever @ (self.lever.swapaxes(-1, -2) @ moved)
         mean = np.einsum("bij,bij->j", moved, left)
@@ -83,9 +83,10 @@ class ClusterScatter:
 
     @cached_property
     def degrees_of_freedom(self) -> Real:
-        """Of the scatter of each parameter, residuals taken as white; 0 where it does not show.
+        """Degrees of freedom of the scatter of each parameter, shape (n_parameters,).
 
-        Satterthwaite's rule; shape (n_parameters,).
+        They follow from Satterthwaite's rule for white residuals, and are 0 for parameters whose
+        variance does not show.
         """
         return np.array(
             [self._freedom(row) if s else 0.0 for row, s in zip(self.root, self.shown, strict=True)]

@@ -1,6 +1,6 @@
-"""Correlation over time of residuals and inputs, and whether it is chance.
+"""Correlation over time of residuals and inputs, and tests whether it is chance.
 
-The tests of Ljung (1999), System Identification, chapter 16, for whoever has residuals.
+The tests are those of Ljung (1999), System Identification, chapter 16.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def covariances(x: Real, y: Real, lags: int) -> Real:
 def pooled_autocovariance(parts: Sequence[Real], lags: int) -> Real:
     """Return ``sum x(t) x(t - lag)`` over all samples of all ``parts`` for lags 0 to ``lags``.
 
-    A part that is shorter counts for the lags it has.
+    A short part contributes only to lags below its length.
     """
     total = np.zeros(lags + 1)
     for x in parts:
@@ -40,8 +40,8 @@ def pooled_autocovariance(parts: Sequence[Real], lags: int) -> Real:
 def covariance_spread(first: Real, second: Real, count: int) -> Real:
     """Return n times the covariance of cross-covariances that are 0 to ``count`` - 1 lags apart.
 
-    ``sum_k R_1(k) R_2(k + lag)`` over all k from -K to K (16.40), for signals that have nothing to do
-    with each other. ``first`` is R_1(0) to R_1(K), ``second`` R_2(0) to R_2(K + count - 1).
+    It is ``sum_k R_1(k) R_2(k + lag)`` over all k from -K to K (16.40), for independent signals.
+    ``first`` is R_1(0) to R_1(K), ``second`` R_2(0) to R_2(K + count - 1).
     """
     one, other = (np.concatenate([r[:0:-1], r]) for r in (first, second))
     return np.asarray(np.correlate(other, one, mode="valid")[count - 1 :])
@@ -51,14 +51,14 @@ def joint_p_value(cross: Real, lags: NDArray[np.int64], spread: Real, least: flo
     """Return the probability of cross-covariances at least as large by chance.
 
     cross, lags
-        (n_lags,) cross-covariances and the lags they belong to.
+        (n_lags,) cross-covariances and their lags.
     spread
-        Covariance of two of them by how many lags they are apart.
+        Covariance of two cross-covariances by the distance of their lags.
     least
-        Directions with less than this share of the largest variance carry no test: periodic or
-        smooth inputs make neighbouring lags nearly one.
+        Directions with less than this share of the largest variance are not tested, because periodic
+        or smooth inputs make neighbouring lags nearly equal.
 
-    NaN where no direction is left.
+    NaN if no direction is left.
     """
     values, vectors = np.linalg.eigh(spread[np.abs(lags[:, None] - lags)])
     kept = values > least * values[-1]
@@ -72,13 +72,13 @@ def whiteness_p_value(autocorrelation: Real, n_samples: int, *, short: bool) -> 
     """Return the probability of autocorrelations at least as large in white noise.
 
     autocorrelation
-        (..., n_lags), at lags from 1 on, one at lag zero.
+        (..., n_lags), at lags from 1 on, normalized to one at lag zero.
     short
-        Whether each counts by the n - lag products it is made of (Ljung and Box 1978), as in
-        records that are short against the lags; else all count alike (16.34).
+        Whether to correct for the n - lag products of each autocorrelation (Ljung and Box 1978), for
+        records that are short relative to the lags; otherwise all count alike (16.34).
 
-    Chi-squared with as many degrees of freedom as lags; estimated parameters take a few off,
-    which makes the test mild.
+    The statistic is chi-squared with as many degrees of freedom as lags. Estimated parameters remove a
+    few degrees of freedom, which makes the test mild.
     """
     lags = autocorrelation.shape[-1]
     weight = (n_samples + 2) / (n_samples - np.arange(1, lags + 1)) if short else 1.0

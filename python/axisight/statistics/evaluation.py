@@ -1,4 +1,4 @@
-"""Models that give residuals and Jacobian in one evaluation, for searches that ask for each alone."""
+"""Caching of models that give residuals and Jacobian together, for searches that request each alone."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ T = TypeVar("T")
 
 
 def last_value(model: Callable[[Real], T]) -> Callable[[Real], T]:
-    """Return ``model`` with its last value kept: asked for the same place again, it answers at once.
+    """Return ``model`` with a cache of its last value.
 
-    A search asks for the residuals at a place and then for the Jacobian there.
+    A search evaluates the residuals at a point and then the Jacobian at the same point.
     """
     kept: dict[bytes, T] = {}
 

@@ -11,14 +11,14 @@ from axisight.errors import InputError
 Real = NDArray[np.float64]
 
 NORMAL_DEVIATIONS = 1.96
-"""Standard deviations that an interval of 95 % of a normal distribution is to either side."""
+"""Half width of the 95 % interval of a normal distribution, in standard deviations."""
 
 
 def student_factor(level: float, degrees_of_freedom: ArrayLike) -> Real:
-    """Return how many standard errors an interval of a ``level`` reaches to either side.
+    """Return the half width of an interval with probability ``level``, in standard errors.
 
-    ``degrees_of_freedom`` of the standard error, infinite where it is known; the result has their
-    shape. Raises InputError for a level that is none.
+    ``degrees_of_freedom`` are those of the standard error, infinite for a known one; the result has
+    their shape. Raises InputError for a level that is not between 0 and 1.
     """
     if not 0 < level < 1:
         raise InputError(f"level: expected a number between 0 and 1, got {level!r}")
@@ -29,10 +29,10 @@ def student_factor(level: float, degrees_of_freedom: ArrayLike) -> Real:
 def student_interval(
     values: Real, standard_error: Real, degrees_of_freedom: ArrayLike, level: float
 ) -> tuple[Real, Real]:
-    """Return the bounds of the intervals of a ``level``, (n,) each.
+    """Return lower and upper bounds of the intervals with probability ``level``, (n,) each.
 
     ``values`` and ``standard_error`` are (n,), ``degrees_of_freedom`` one number or (n,). Raises
-    InputError for a level that is none.
+    InputError for a level that is not between 0 and 1.
     """
     half = student_factor(level, degrees_of_freedom) * standard_error
     return values - half, values + half

@@ -1,4 +1,4 @@
-"""Random starts of a search, a function of seed and number alone."""
+"""Random starts of a search, which depend only on seed and number."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class StartRange:
-    """Where the starts of one parameter are drawn.
+    """The range of random starts of one parameter.
 
-    Evenly from ``low`` to ``high``, or evenly in the logarithm, which takes two limits of one sign;
-    then clipped to ``bounds``.
+    Starts are uniform from ``low`` to ``high``, or uniform in the logarithm for two limits of one sign,
+    and then clipped to ``bounds``.
     """
 
     low: float
@@ -33,10 +33,10 @@ class StartRange:
 def drawn_start(
     values: Sequence[float], ranges: Sequence[StartRange | None], seed: int, number: int
 ) -> list[float]:
-    """Return the start ``number`` of a ``seed``: of each parameter one from its range.
+    """Return the random start ``number`` of a ``seed``, one value per parameter from its range.
 
-    ``values`` (n,) are those of parameters without a range, which stay; they take a random number
-    too, so that what the others get does not depend on them.
+    A parameter without a range keeps its entry of ``values`` (n,). It uses a random number too, so that
+    the draws of other parameters do not depend on it.
     """
     shares = np.random.default_rng([seed, number]).random(len(values))
     return [

@@ -1,6 +1,6 @@
 """Tails of the normal, Student's and Fisher's distributions.
 
-As the package of all distributions has them, which takes longer to load than these to be evaluated.
+They avoid ``scipy.stats``, which takes longer to load than these functions to evaluate.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import scipy
 
 
 def normal_deviate(tail: float) -> float:
-    """Return the standard deviations above which a normal deviate lies with probability ``tail``."""
+    """Return the standard deviations that a normal deviate exceeds with probability ``tail``."""
     return float(-scipy.special.ndtri(tail))
 
 
 def log_student_tail(value: float, degrees_of_freedom: float) -> float:
     """Return the logarithm of the probability that a Student's t is larger than ``value``.
 
-    Minus infinity where floating point has no such probability.
+    Minus infinity for a probability too small for floating point.
     """
     with np.errstate(divide="ignore"):
         return float(np.log(scipy.special.stdtr(degrees_of_freedom, -value)))
@@ -26,8 +26,8 @@ def log_student_tail(value: float, degrees_of_freedom: float) -> float:
 def log_fisher_tail(value: float, above: float, below: float) -> float:
     """Return the logarithm of the probability that a ratio of variances is larger than ``value``.
 
-    ``above``, ``below``: degrees of freedom of numerator and denominator. Minus infinity where floating
-    point has no such probability.
+    ``above`` and ``below`` are the degrees of freedom of numerator and denominator. Minus infinity for
+    a probability too small for floating point.
     """
     with np.errstate(divide="ignore"):
         return float(np.log(scipy.special.fdtrc(above, below, value)))

@@ -1,4 +1,4 @@
-"""Causes back into the user's own model: what a diagnosis found, in URDF, MJCF or a robot file."""
+"""Causes of a diagnosis written back to the user's model: URDF, MJCF or robot file."""
 
 from axisight.write_back.model import Written, check_target, write_model
 

@@ -1,4 +1,4 @@
-"""Motors of an MJCF that give more or less torque than they are told, later, or no more than so much."""
+"""MJCF motors with another gain, a lag, a delay or a limit of their torque."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from axisight.write_back.xml_edits import Edits, Numbers
 if TYPE_CHECKING:
     from axisight.gap.facts.result import Cause
 
-# What makes a <general> what a <motor> is, with a gain.
+# Attributes of a <general> that is a <motor> with a gain.
 _MOTOR = {"gaintype": "fixed", "biastype": "none", "dyntype": "none"}
-# What a lag makes of it.
+# Attribute values that a lag adds.
 _LAGS = {"dyntype": ("filter", "filterexact")}
-# How an actuator names its joint: for one axis both are the same.
+# Attributes by which an actuator names its joint; equivalent on joints with one axis.
 _JOINTS = ("joint", "jointinparent")
-# Of a file that states none.
+# MuJoCo's default time step.
 _STEP_S = 0.002
 
 
@@ -45,7 +45,7 @@ _ATTRIBUTES: Mapping[str, tuple[str, Callable[[float, float], Mapping[str, Numbe
     LAG[0]: (LAG[1], _lag),
     TRANSPORT_DELAY[0]: (TRANSPORT_DELAY[1], delayed),
 }
-# A limit is one before the gear of the file besides.
+# Apart from `_ATTRIBUTES`, because a limit must be converted to the side before the file's gear.
 _OF_MOTORS = frozenset((*_ATTRIBUTES, TORQUE_LIMIT[0]))
 DRIVE_EFFECTS = _OF_MOTORS.union(SERVO_EFFECTS)
 
@@ -57,13 +57,14 @@ def write_drive(
     found: tuple[Sequence[Cause], Sequence[Refitted]],
     limits: Limits,
 ) -> Placed:
-    """Write what was found of one joint into its actuator; ``gear`` stays, which is the gear's.
+    """Write the findings on one joint into its actuator; the gear ratio in ``gear`` stays.
 
-    ``joint``: its name and where it stands, None in another file; ``found``: causes and re-fitted gains.
+    ``joint``: its name and its element, None if that is in another file. ``found``: causes and re-fitted
+    gains.
 
-    MuJoCo delays a command, limits it, lets it lag and takes the gain, as a torque path does.
-    A <motor> has no gain and no lag: it becomes the <general> that it is short for, whatever defaults a file
-    has for those.
+    MuJoCo delays, limits, lags and amplifies a command in the order of a torque path. A <motor> has neither
+    gain nor lag, so it becomes the <general> that it abbreviates, with explicit values against the file's
+    defaults.
     """
     placed, (causes, refitted) = Placed(), found
     holders = [e for e in root.walk() if e.tag == "actuator"]
@@ -87,7 +88,7 @@ def write_drive(
         placed.refuse(causes, f"expected one motor of the joint that has a gain, got {got}")
         return placed
     made: dict[str, Numbers] = {}
-    # The last of one kind has taken the place of what the simulator had.
+    # The last cause of a kind replaces the simulator's effect.
     for cause in causes:
         if cause.effect == TORQUE_LIMIT[0]:
             made |= _limit(limits.of_actuator(cause.parameters[TORQUE_LIMIT[1]].value))
@@ -109,7 +110,7 @@ def write_drive(
 
 
 def _cannot_limit(limits: Limits, joint: Element | None) -> str:
-    """Return why a limit cannot be written; nothing where it can."""
+    """Return why a limit cannot be written; empty if it can."""
     if not limits.alike:
         return "expected limits of force in the file that are the same both ways"
     if joint is None and math.isfinite(limits.drive.force_limits[1]):
@@ -118,19 +119,22 @@ def _cannot_limit(limits: Limits, joint: Element | None) -> str:
 
 
 def _step_s(root: Element) -> float:
-    """Return the time step that a model states."""
+    """Return the time step of a model [s]."""
     steps = [e.attributes["timestep"] for e in root.all("option") if "timestep" in e.attributes]
     return float(steps[-1]) if steps else _STEP_S
 
 
 def _has_ratio_defaults(root: Element) -> bool:
-    """Whether defaults of the file have a damping ratio, which allows no gain of speed beside it."""
+    """Return whether the file's defaults have a damping ratio, which excludes a speed gain."""
     defaults = [e for e in root.walk() if e.tag == "default"]
     return any("dampratio" in e.attributes for d in defaults for e in d.walk())
 
 
 def _is_motor(element: Element, defaults: bool) -> bool:
-    """Whether an actuator is a source of torque, whose gain is one or said; ``defaults``: a file may have some."""
+    """Return whether an actuator is a source of torque with a stated or unit gain.
+
+    ``defaults``: the file may have defaults for actuators.
+    """
     if element.tag == "motor":
         return True
     said_so = {key: element.attributes.get(key) for key in _MOTOR}

@@ -1,7 +1,7 @@
-"""Where axes lie in the text of a URDF or MJCF: lengths of links, zeros of joints, the tilt of the base.
+"""Positions of axes in the text of a URDF or MJCF: link lengths, joint zeros, tilt of the base.
 
-Frames of links are parallel to the base's at zero angle, those of the file may be turned: what is parallel to
-the base is turned into the frame of the body that an element stands in.
+Link frames are parallel to the base frame at zero angles. Frames of the file may be rotated: vectors are
+transformed to the frame of the body that contains the element.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ FRAME_EFFECTS = (LINK_GEOMETRY, JOINT_ZERO[0], BASE_TILT)
 
 @dataclass
 class _Move:
-    """What becomes of a joint of the chain: its place shifted [m] and all turned, both in the base's frame.
+    """Change of a joint of the chain: its position shifted [m] and everything rotated, in the base frame.
 
-    ``turned``: of what the joint stands on; ``zero_rad``: of its own angle.
+    ``turned``: rotation of what the joint stands on. ``zero_rad``: change of the joint's zero.
     """
 
     shift_m: Array = field(default_factory=lambda: np.zeros(3))
@@ -51,7 +51,10 @@ def write_frames(
     robot: Robot,
     causes: Sequence[Cause],
 ) -> Placed:
-    """Write causes that are frames, and say which the file has no place for; ``model``: what it has."""
+    """Write causes that change frames; return what was written, and why the rest was not.
+
+    ``model``: the tree of the file and its chain.
+    """
     placed = Placed()
     moves: dict[int, _Move] = {}
     urdf = root.tag == "robot"
@@ -85,7 +88,7 @@ def _done(placed: Placed, causes: Sequence[Cause], why: str) -> None:
 
 
 def _at(robot: Robot, cause: Cause) -> int:
-    """Return the joint, from 0, whose place says a cause."""
+    """Return the joint (from 0) whose position a cause changes."""
     if cause.axis is None:
         return 0
     joint = int(robot.axis_joints[cause.axis - 1])
@@ -97,13 +100,13 @@ def _vector(cause: Cause) -> Array:
 
 
 def _level(cause: Cause) -> Rotation:
-    """Return how gravity turns in the frame of a tilted base: R_y(-b) R_x(-a)."""
+    """Return the rotation of gravity in the frame of a tilted base: R_y(-b) R_x(-a)."""
     angles = [-cause.parameters[name].value for name in ("about_x_rad", "about_y_rad")]
     return Rotation.from_euler("xy", angles)
 
 
 def _below(tree: Tree, chain: Chain, at: int) -> Rotation:
-    """Return how the body that carries a joint is turned in the base, all angles at zero."""
+    """Return the rotation from the base to the body that carries a joint, at zero angles."""
     carrier = chain.joints[at].body.parent
     turned = np.eye(3)
     for body in tree.path(carrier) if carrier is not None else ():
@@ -112,7 +115,7 @@ def _below(tree: Tree, chain: Chain, at: int) -> Rotation:
 
 
 def _urdf(edits: Edits, root: Element, model: tuple[Tree, Chain], at: int, move: _Move) -> str:
-    """Set or add the <origin> of a joint; return why not, nothing where it was done."""
+    """Set or add the <origin> of a joint; return why that failed, empty if it did not."""
     tree, chain = model
     body = chain.joints[at].body
     joint = next(e for e in root.all("joint") if e.attributes.get("name") == body.joint)
@@ -138,7 +141,7 @@ def _about(axis: Array, angle_rad: float) -> Rotation:
 
 
 def _mjcf(edits: Edits, root: Element, model: tuple[Tree, Chain], at: int, move: _Move) -> str:
-    """Set the place of a body and the reference of its joint; return why not, nothing where it was done."""
+    """Set the position of a body and the reference of its joint; return why that failed, else empty."""
     tree, chain = model
     joint = chain.joints[at].body
     named = {(e.tag, e.attributes.get("name")): e for e in root.walk()}
@@ -155,14 +158,14 @@ def _mjcf(edits: Edits, root: Element, model: tuple[Tree, Chain], at: int, move:
         place = np.array(body.numbers("pos", 3, (0.0, 0.0, 0.0))) + shift
         edits.set(body, {"pos": place.tolist()}, said(_of(move, LINK_GEOMETRY)))
     if move.zero_rad:
-        # A larger angle than is read is a smaller one that the model counts from.
+        # An angle that exceeds its reading means a smaller reference.
         reference = own.number("ref", 0.0) - move.zero_rad * angle_unit(root)
         edits.set(own, {"ref": reference}, said(_of(move, JOINT_ZERO[0])))
     return ""
 
 
 def _why_not(root: Element, body: Element | None, own: Element | None, move: _Move) -> str:
-    """Return why what an MJCF says of a joint and its body cannot be changed in place."""
+    """Return why the text of a joint and its body cannot be changed in an MJCF; empty if it can."""
     if body is None or own is None:
         return "its body or joint stands in another file or has no name"
     if np.any(move.shift_m) and any(body in frame.walk() for frame in _all(root, "frame")):
@@ -186,13 +189,13 @@ def _of(move: _Move, effect: str) -> list[Cause]:
 
 
 def angle_unit(root: Element) -> float:
-    """Return how much of the unit of angles, which an MJCF chooses, is one radian."""
+    """Return one radian in the unit of angles that an MJCF chooses."""
     said_so = [e.attributes["angle"] for e in _all(root, "compiler") if "angle" in e.attributes]
     return 1.0 if said_so[-1:] == ["radian"] else math.degrees(1.0)
 
 
 def _gravity(edits: Edits, root: Element, chain: Chain, cause: Cause) -> str:
-    """Turn the gravity of an MJCF; return why not, nothing where it was done."""
+    """Rotate the gravity of an MJCF; return why that failed, else empty."""
     gravity = {"gravity": _level(cause).apply(chain.gravity_m_s2).tolist()}
     options = root.all("option")
     own = [e for e in options if "gravity" in e.attributes]

@@ -15,14 +15,14 @@ from axisight.write_back.xml_edits import Edits
 
 Array = NDArray[np.float64]
 
-# What else MJCF may say of the axes of an inertia.
+# Attributes by which MJCF states the axes of an inertia.
 _AXES = ("diaginertia", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 _ENTRIES = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
 _NAMES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 def write_bodies(edits: Edits, root: Element, changes: Sequence[BodyChange]) -> Placed:
-    """Write changes of bodies, and say which the file has no place for."""
+    """Write changed bodies; return what was written, and why the rest was not."""
     placed = Placed()
     tag = "link" if root.tag == "robot" else "body"
     bodies = {e.attributes.get("name"): e for e in root.walk() if e.tag == tag}
@@ -42,7 +42,7 @@ def write_bodies(edits: Edits, root: Element, changes: Sequence[BodyChange]) -> 
 
 
 def _mjcf(edits: Edits, root: Element, body: Element, change: BodyChange) -> str:
-    """Set or add <inertial>; return why not, nothing where it was done."""
+    """Set or add <inertial>; return why that failed, else empty."""
     for compiler in (e for e in root.walk() if e.tag == "compiler"):
         for name, usual in (("inertiafromgeom", "auto"), ("settotalmass", "-1")):
             if compiler.attributes.get(name, usual) not in (usual, "false"):
@@ -68,11 +68,11 @@ def _mjcf(edits: Edits, root: Element, body: Element, change: BodyChange) -> str
 
 
 def _urdf(edits: Edits, root: Element, link: Element, change: BodyChange) -> str:
-    """Set what <inertial> says; the frame of the inertia stays turned as it is."""
+    """Set the values in <inertial>; the inertia's frame keeps its rotation."""
     del root
     own = link.find("inertial")
     masses, inertias = (None if own is None else own.find(t) for t in ("mass", "inertia"))
-    assert own is not None  # A body without has no mass, and no change.
+    assert own is not None  # A body without <inertial> has no mass to change.
     assert masses is not None
     assert inertias is not None
     origin, after = own.find("origin"), change.after

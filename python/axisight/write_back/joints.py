@@ -1,4 +1,4 @@
-"""Numbers of joints: friction, damping, armature, springs."""
+"""Values of joints: friction, damping, armature, springs."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ JOINT_NUMBERS = {
         JOINT_SPRING[0]: "stiffness",
     },
 }
-"""What a model has a number for on its joints, by its root and by effect."""
+"""Effects that are a number on the model's joints, by the root tag of the file."""
 
 
 def write_joint(
@@ -44,9 +44,9 @@ def write_joint(
     causes: Sequence[Cause],
     of_actuators: Mapping[str, float],
 ) -> Placed:
-    """Write the causes of one axis (from 0) that are numbers of its joint, with one comment.
+    """Write causes of one axis (from 0) that are numbers of its joint, with one comment.
 
-    ``of_actuators``: how much of a number, by name, the file has on actuators, where it stays.
+    ``of_actuators``: share of a number, by name, that the file states on actuators, where it stays.
     """
     placed = Placed()
     by_number: dict[str, list[Cause]] = {}
@@ -72,11 +72,11 @@ def write_joint(
 
 
 def _number(robot: Robot, axis: int, causes: Sequence[Cause]) -> float:
-    """Return what causes of one number make of it: of the joint."""
+    """Return the number that results from causes on the same number, joint side."""
     ratio = abs(float(robot.gear_ratio[axis]))
     first = effect_info(causes[0].effect)
     if first.stands_for is None:
-        # It has taken the place of what the simulator had.
+        # The cause replaces the simulator's effect.
         value = next(iter(causes[-1].parameters.values())).value
         return value / ratio if first.acts == "motor" else value
     name = robot.axis_parameter(axis + 1, first.stands_for[0])
@@ -89,13 +89,13 @@ def _number(robot: Robot, axis: int, causes: Sequence[Cause]) -> float:
 
 
 def _at_zero(spring: Cause) -> float:
-    """Return the torque of a spring [Nm] where its joint is at zero."""
+    """Return the torque of a spring [Nm] with its joint at zero."""
     found = spring.parameters.get(JOINT_SPRING[2])
     return 0.0 if found is None else found.value
 
 
 def _rest(joint: Element, at_zero: float, stiffness: float, unit: float) -> dict[str, float]:
-    """Return where a spring rests, one radian being ``unit``; nothing where that is zero and the file says nothing."""
+    """Return the reference of a spring in units of ``unit`` per radian; empty if none is needed."""
     if at_zero == 0:
         return {"springref": 0.0} if "springref" in joint.attributes else {}
     return {"springref": at_zero / stiffness * unit}

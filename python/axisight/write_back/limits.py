@@ -1,4 +1,4 @@
-"""Limits of force of an MJCF, which stand behind the gains: of actuators before their gear, and of joints."""
+"""Force limits of an MJCF, which act after the gains: of actuators, before their gear, and of joints."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ if TYPE_CHECKING:
     from axisight.gap.facts.result import Cause
 
 LIMIT_EFFECTS = frozenset((TORQUE_LIMIT[0], TORQUE_CONSTANT[0]))
-"""Causes that change what a limit of force has to be."""
+"""Causes that change a force limit."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What an MJCF limits of one joint, and what the robot that was diagnosed does.
+    """Limits of one joint in an MJCF, and of the diagnosed robot.
 
-    ``drive``: of the file; ``own_nm``: limit of the robot before the causes, motor side; ``ratio``: of its
-    gear, which is not the file's where the drive data have another one.
+    - ``drive``: of the file.
+    - ``own_nm``: limit of the robot before the causes, motor side.
+    - ``ratio``: gear ratio of the robot, which differs from the file's if the drive data state another.
     """
 
     drive: Drive
@@ -33,20 +34,20 @@ class Limits:
 
     @property
     def alike(self) -> bool:
-        """Whether what the file limits it does the same both ways, as a torque is limited."""
+        """Whether the file's limit is the same in both directions, like a torque limit."""
         return not any(math.isnan(x) for x in self.drive.force_limits)
 
     def of_actuator(self, limit_nm: float) -> float:
-        """Return a limit [Nm] of the robot's motor as one before the gear of the file."""
+        """Return a motor-side limit [Nm] as a limit before the file's gear."""
         return limit_nm * abs(self.drive.gear_ratio / self.ratio)
 
     def set_by(
         self, causes: Sequence[Cause], *, servo: bool
     ) -> tuple[Mapping[str, Numbers], Mapping[str, Numbers]]:
-        """Return attributes of the actuator and of the joint, so that the limit of the causes is what acts.
+        """Return attributes of actuator and joint that make the causes' limit effective.
 
-        Gains stand before them: a motor that gives less is limited by less. ``servo``: the actuator has no
-        limit of a command that would be one of torque.
+        Gains act before force limits, so a motor with less gain needs a smaller limit. ``servo``: the
+        actuator has no limit of its command that would limit the torque.
         """
         limit, gain = self.own_nm, 1.0 if servo else self.drive.gain
         for cause in causes:
@@ -70,7 +71,7 @@ class Limits:
 
 
 def limits_of(drive: Drive, robot: Robot, axis: int) -> Limits:
-    """Return the limits of an axis (from 0) of a robot, whose ``drive`` a file says."""
+    """Return the limits of a robot's axis (from 0), with ``drive`` from the file."""
     mine = [e for e in robot.effects if e.name == TORQUE_LIMIT[0] and e.axis == axis + 1]
     own = mine[0].values()[0] if mine else math.inf
     return Limits(drive, own, float(robot.gear_ratio[axis]))

@@ -1,7 +1,8 @@
-"""What causes make of the bodies of a model file: mass, centre of mass and inertia, exactly.
+"""The exact change that causes make to bodies of a model file: mass, centre of mass, inertia.
 
-A link of the chain is one or several bodies of the file, in a frame that is parallel to the base's at zero
-angle. Mass, first moment and inertia about one point add up: the body that the joint moves takes all of the change.
+A link of the chain is one or several bodies of the file, in a frame parallel to the base frame at zero
+angles. Mass, first moment and inertia about one point add up. The body that the joint moves takes the whole
+change.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ LINK_EFFECTS = (LINK_MASS, LINK_COM, LINK_INERTIA, LOAD)
 
 @dataclass(frozen=True, eq=False)
 class BodyChange:
-    """A body of the file by name, its mass before and after in its own frame, and why."""
+    """A body of the file by name, with its mass before and after in its own frame, and the causes."""
 
     body: str
     before: Mass
@@ -40,9 +41,9 @@ class BodyChange:
 def body_changes(
     tree: Tree, chain: Chain, robot: Robot, causes: Sequence[Cause]
 ) -> tuple[list[BodyChange], Placed]:
-    """Return what causes on links, and loads, make of bodies, and those that none can have.
+    """Return the changed bodies by causes on links and loads, and why the other causes cannot be written.
 
-    ``tree`` and ``chain``: what the model file has.
+    ``tree`` and ``chain``: of the model file.
     """
     placed = Placed()
     by_joint: dict[int, list[Cause]] = {}
@@ -68,21 +69,21 @@ def body_changes(
 
 
 def _frame(joint: ChainJoint, pose: Pose) -> Pose:
-    """Return where a body's frame is in that of the link; ``pose``: of the body behind its joint."""
+    """Return the pose of a body in its link's frame; ``pose``: of the body behind its joint."""
     turned = Pose(joint.rotation, np.zeros(3))
-    # Where a joint and its body are one, as in URDF, the pose is that of the joint in its parent.
+    # In URDF, joint and body are one element, and the pose is that of the joint in its parent.
     return turned @ pose if joint.body.of else turned
 
 
 def _changed(robot: Robot, at: int, causes: Sequence[Cause], own: Mass) -> Mass | None:
-    """Return the body with all of what causes change of its link, in the frame of the link."""
+    """Return the body with all causes on its link, in the frame of the link; None without a mass."""
     link = robot.joints[at].link
     assert link is not None
     xx, yy, zz, xy, xz, yz = link.inertia_kg_m2
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     before = Mass(link.mass_kg, np.asarray(link.com_m), inertia)
     after = before
-    # One after another, as the simulator has them.
+    # In the simulator's order.
     for cause in causes:
         values = {name: p.value for name, p in cause.parameters.items()}
         after = _with(after, cause.effect, values)
@@ -104,14 +105,14 @@ def _with(mass: Mass, effect: str, values: Mapping[str, float]) -> Mass:
 
 
 def _sums(mass: Mass) -> Array:
-    """Return what adds up when bodies are joined: mass, first moment, inertia about the origin (13,)."""
+    """Return what adds up when bodies join: mass, first moment, inertia about the origin (13,)."""
     return np.concatenate(
         [[mass.mass_kg], mass.mass_kg * mass.com_m, (mass.inertia_kg_m2 + _steiner(mass)).ravel()]
     )
 
 
 def _body(sums: Array) -> Mass | None:
-    """Return the body of such sums; None without a mass."""
+    """Return the body with these sums; None without a mass."""
     if sums[0] <= 0:
         return None
     mass = Mass(float(sums[0]), sums[1:4] / sums[0], np.zeros((3, 3)))
@@ -124,6 +125,6 @@ def _steiner(mass: Mass) -> Array:
 
 
 def _possible(mass: Mass) -> bool:
-    """Whether a body can have such an inertia: no principal moment above the sum of the others."""
+    """Return whether the inertia is possible: no principal moment exceeds the sum of the others."""
     moments = np.linalg.eigvalsh(mass.inertia_kg_m2)
     return bool(moments[0] > 0 and moments[2] <= (moments[0] + moments[1]) * (1 + 1e-9))

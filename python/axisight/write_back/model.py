@@ -1,4 +1,4 @@
-"""Which numbers of a model file a cause changes, and what it has no place for."""
+"""Writing of a model file with its causes: which numbers change, and which causes it cannot express."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ if TYPE_CHECKING:
     from axisight.gap.facts.result import Cause, Interval
 
 _KINDS = (".urdf", ".xml", ".mjcf")
-# Why the drive of a joint takes nothing, or no gains.
+# Reason why a joint's drive takes nothing, or no gains.
 _NO_LAW = "the controller stands in the drive data, the file has no gains of it"
 _NO_JOINT = "the file has no driven joint of this name"
 
 
-# A model file, and the drive data it was read with; None: what stands beside it.
+# A model file and the drive data it was read with; None: the drive data beside the file.
 _Source = tuple[Path, DriveData | None]
 
 
 @summarized
 @dataclass(frozen=True)
 class Written:
-    """A model that was written: labels of the causes and re-fitted gains in it, and of those that it has no place for.
+    """A written model: labels of causes and re-fitted gains that it contains, and of those it cannot express.
 
-    ``why``: for each of the latter, by label; ``remaining``: causes among them as effects, of which
-    `axisight.mujoco.apply` takes those that are torques or inside gears.
+    ``why``: reasons for the latter, by label. ``remaining``: causes among them as effects;
+    `axisight.mujoco.apply` takes those that are torques or act inside gears.
     """
 
     path: Path
@@ -69,28 +69,27 @@ def write_model(
     overwrite: bool = False,
     drives: DriveData | None = None,
 ) -> Written:
-    """Write the model of a diagnosis with its causes.
+    """Write the model of a diagnosis with its causes, and return what it contains.
 
     source
-        What ``robot`` was read from: a robot file or a preset, which is written as a robot file (``.toml``)
-        with all causes as effects; a URDF or MJCF, which is written as its own kind, or as a robot file.
+        What ``robot`` was read from. A robot file or a preset is written as a robot file (``.toml``) with all
+        causes as effects. A URDF or MJCF is written in its own format, or as a robot file.
     target
-        File to write. Of a URDF or MJCF all bytes stay but the numbers that change, each with a comment that says
-        cause, value, interval, probability and what the data cannot tell from it:
-        dry and viscous friction of joints; masses, centres of mass and
-        inertias of links, and a load on the last one; where an axis lies in its link, where the zero of a joint
-        is, how the base is tilted; of an MJCF also rotors (armature), springs of joints, and gains, limits, delays
-        and lags of motors.
+        File to write. In a URDF or MJCF all other bytes stay. Each changed number has a comment with cause,
+        value, interval, probability and what the data cannot tell from it. Both formats take dry and viscous
+        friction of joints, masses, centres of mass and inertias of links, a load on the last link, positions
+        of axes, zeros of joints and the tilt of the base. An MJCF also takes rotors (armature), springs of
+        joints, and gains, limits, delays and lags of motors.
     refit
-        `Diagnosis.refit`: relative changes [1] by name. Gains of a controller of targets among them (``j1.kp``)
-        become those of the robot file, or of the actuators of an MJCF; all else that was re-fitted within its
-        tolerance stays as it is.
+        `Diagnosis.refit`: relative changes [1] by name. Gains of a controller with position targets
+        (``j1.kp``) go to the robot file, or to the actuators of an MJCF. All other re-fitted values stay
+        unwritten.
     overwrite
-        Replace a file that exists.
+        Replace an existing file.
     drives
-        What ``robot`` was read with; None: what stands beside the file.
+        The drive data ``robot`` was read with; None: those beside the file.
 
-    Raises InputError as `check_target`.
+    Raises InputError as `check_target` does, and for a ``source`` that is no URDF or MJCF in UTF-8.
     """
     check_target(source, target, overwrite=overwrite)
     path, gains = Path(target), refitted_gains(robot, refit)
@@ -100,9 +99,9 @@ def write_model(
 
 
 def check_target(source: Path | str, target: Path | str, *, overwrite: bool = False) -> None:
-    """Raise InputError for a ``target`` that a ``source`` cannot be written as, and for a file in the way.
+    """Raise InputError if ``source`` cannot be written as ``target``, or if ``target`` exists.
 
-    ``overwrite``: files that exist are no obstacle.
+    ``overwrite``: an existing file is no error.
     """
     path, kind = Path(target), Path(target).suffix.lower()
     storage.check_target(path, overwrite=overwrite)
@@ -136,7 +135,7 @@ def _as_robot_file(
     return Written(path, tuple(x.label for x in every), ())
 
 
-# Causes, and gains that were re-fitted.
+# Causes and re-fitted gains.
 _Found = tuple[Sequence["Cause"], Sequence[Refitted]]
 
 
@@ -173,9 +172,9 @@ def _as_model(origin: _Source, robot: Robot, found: _Found, path: Path) -> Writt
 def _on_axes(
     edits: Edits, root: Element, source: _Source, robot: Robot, found: _Found
 ) -> list[Placed]:
-    """Write what belongs to joints and motors, axis by axis."""
+    """Write the findings on joints and motors, axis by axis."""
     causes, gains = found
-    # Transmissions, actuators and constraints name joints by elements of the same name.
+    # Only these elements hold joints: transmissions, actuators and constraints name joints by the same tag.
     holders = [root] if root.tag == "robot" else [e for e in root.walk() if e.tag == "body"]
     joints = {e.attributes.get("name"): e for holder in holders for e in holder.all("joint")}
     out = []
@@ -208,14 +207,14 @@ def _on_axes(
     return out
 
 
-# Numbers of joints that actuators have too.
+# Numbers that joints and actuators can both have.
 _SHARED = ("armature", "damping")
 
 
 def _drives_of(source: _Source, found: _Found) -> tuple[dict[str, Drive], bool]:
-    """Return what an MJCF has on the drive of each joint, by name, and whether its law is the controller's.
+    """Return the drives of an MJCF by joint name, and whether the controller's law is in the drive data.
 
-    Nothing where what was found does not need it.
+    Empty if the findings need no drive.
     """
     causes, gains = found
     shared = any(JOINT_NUMBERS["mujoco"].get(cause.effect) in _SHARED for cause in causes)
@@ -228,7 +227,7 @@ def _drives_of(source: _Source, found: _Found) -> tuple[dict[str, Drive], bool]:
 
 
 def _of_actuators(drive: Drive | None) -> dict[str, float]:
-    """Return how much of a number of a joint its actuators have, by number."""
+    """Return the part of each joint number that the actuators state."""
     return {} if drive is None else dict(zip(_SHARED, drive.of_actuators, strict=True))
 
 
@@ -239,7 +238,7 @@ def _on_chain(
     robot: Robot,
     causes: Sequence[Cause],
 ) -> list[Placed]:
-    """Write what belongs to links, and to where axes lie."""
+    """Write the findings on links and on positions of axes."""
     links = [cause for cause in causes if cause.effect in LINK_EFFECTS]
     frames = [cause for cause in causes if cause.effect in FRAME_EFFECTS]
     if not links and not frames:
@@ -256,7 +255,7 @@ def _on_chain(
 
 
 def _no_number(root: Element, effect: Effect) -> str:
-    """Return why nothing of a model says an effect."""
+    """Return why no number of a model can express an effect."""
     if root.tag == "mujoco" and is_torque(effect):
         return "MJCF has no number for it: axisight.mujoco.apply adds it at every step"
     if root.tag == "mujoco" and acts_in_gear(effect):

@@ -1,4 +1,4 @@
-"""What became of causes: where they stand in a model, or why they do not."""
+"""The fate of causes: written to the model, or why not."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ if TYPE_CHECKING:
 
 
 class Labelled(Protocol):
-    """A cause, or a gain that was re-fitted."""
+    """A cause or a re-fitted gain."""
 
     @property
     def label(self) -> str:
-        """Its name."""
+        """The label."""
 
 
 @dataclass
 class Placed:
-    """Labels of the causes that stand in the model, and why the others do not, by label."""
+    """Labels of the causes in the model, and by label why the others are not."""
 
     there: set[str] = field(default_factory=set)
     why_not: dict[str, str] = field(default_factory=dict)
 
     def refuse(self, causes: Sequence[Labelled], why: str) -> None:
-        """Say why causes do not stand in the model."""
+        """Record why causes are not in the model."""
         self.why_not |= {cause.label: why for cause in causes}
 
     def joined(self, other: Placed) -> Placed:
-        """Return both as one."""
+        """Return both records as one."""
         return Placed(self.there | other.there, self.why_not | other.why_not)
 
     def take(self, causes: Sequence[Labelled]) -> None:
-        """Say that causes stand in the model."""
+        """Record that causes are in the model."""
         self.there |= {cause.label for cause in causes}
 
 
 def said(causes: Sequence[Cause], more: Sequence[str] = ()) -> str:
-    """Return what a comment says: of causes values, intervals, probabilities and rivals; and ``more``."""
+    """Return the text of a comment: values, intervals, probabilities and rivals of causes, then ``more``."""
     return "axisight: " + "; ".join([*map(_cause, causes), *more])
 
 
@@ -60,5 +60,5 @@ def _cause(cause: Cause) -> str:
 
 
 def doubt(cause: Cause) -> list[str]:
-    """Return that the data cannot tell a cause from others, as one item; none where they can."""
+    """Return one item if the data cannot tell a cause from others, else none."""
     return [f"the data cannot tell it from {listed(cause.rivals, 'or')}"] if cause.rivals else []

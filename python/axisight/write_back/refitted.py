@@ -1,4 +1,4 @@
-"""Gains of a controller of targets that were re-fitted: no causes, but numbers that a model says."""
+"""Re-fitted gains of a controller with position targets, which are no causes but stand in models."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Refitted:
-    """A gain of an axis (from 1): its name (``j1.kp``), and by what share of the stated one it is another.
+    """A re-fitted gain of an axis (from 1): its name (``j1.kp``) and its relative change [1].
 
     ``gain``: its key in robot files (``kp``).
     """
@@ -29,17 +29,17 @@ class Refitted:
 
     @property
     def value(self) -> float:
-        """The gain that was found, motor side [unit of the stated one]."""
+        """The re-fitted gain, motor side, in the unit of the stated one."""
         return self.stated * (1 + self.change.value)
 
     @property
     def standard_error(self) -> float:
-        """Its standard error."""
+        """Standard error of the gain, in the same unit."""
         return self.stated * (self.change.high - self.change.low) / (2 * NORMAL_DEVIATIONS)
 
     @property
     def words(self) -> str:
-        """What a comment says of it."""
+        """Text of the gain for a comment."""
         low, value, high = (1 + x for x in (self.change.low, self.change.value, self.change.high))
         return (
             f"{self.label}: {value:.4g} ({low:.4g} to {high:.4g}) times the stated gain, re-fitted"
@@ -47,7 +47,7 @@ class Refitted:
 
 
 def refitted_gains(robot: Robot, refit: Mapping[str, Interval]) -> list[Refitted]:
-    """Return the gains among what was re-fitted, by name; masses and friction stay as they are."""
+    """Return the re-fitted gains, by name; re-fitted masses and friction are left out."""
     found = []
     for name in gain_names(robot):
         if name in refit:
@@ -59,6 +59,6 @@ def refitted_gains(robot: Robot, refit: Mapping[str, Interval]) -> list[Refitted
 
 
 def factors(gains: Sequence[Refitted]) -> tuple[float, float]:
-    """Return what gains of position and of speed, ``kp`` and ``kd``, are times the stated ones."""
+    """Return the factors on the stated gains of position and speed, ``kp`` and ``kd``."""
     found = {gain.gain: 1 + gain.change.value for gain in gains}
     return found.get("kp", 1.0), found.get("kd", 1.0)

@@ -1,4 +1,4 @@
-"""Actuators of an MJCF with targets of positions: other gains, less torque, a limit of it, late targets."""
+"""MJCF actuators with position targets: other gains, less torque, a torque limit, late targets."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
     from axisight.gap.facts.result import Cause
 
 SERVO = "position"
-"""Tag of the usual such actuator."""
+"""Tag of the most common actuator with a target."""
 
 _TOLD_SPEEDS = "velocity"
-# What sums speeds up has a target of positions too.
+# <intvelocity> integrates speeds to a position target.
 _TAGS = (SERVO, "intvelocity", _TOLD_SPEEDS)
 _GENERAL = "general"
 
 SERVO_EFFECTS = (OTHER_GAINS[0], TORQUE_CONSTANT[0], TRANSPORT_DELAY[0], TORQUE_LIMIT[0])
-"""What their attributes say: ``kp`` and ``kv`` times what is found, ``delay`` of targets, ``forcerange``."""
+"""Effects that attributes express: factors on ``kp`` and ``kv``, ``delay`` of targets, ``forcerange``."""
 
 _OF_GAINS = (OTHER_GAINS[0], TORQUE_CONSTANT[0])
 
 
 @dataclass(frozen=True)
 class Servo:
-    """The only actuator of a joint: its element and the joint's, None in another file, and its limits.
+    """The only actuator of a joint: its element, the joint's (None if in another file), and its limits.
 
-    ``ratio_defaults``: the file has a damping ratio for all of them.
+    ``ratio_defaults``: the file has a default damping ratio.
     """
 
     element: Element
@@ -45,19 +45,19 @@ class Servo:
 
     @property
     def known(self) -> Sequence[str]:
-        """Effects that it has attributes for."""
+        """Effects that the actuator has attributes for."""
         return (TORQUE_LIMIT[0],) if self.element.tag == _TOLD_SPEEDS else SERVO_EFFECTS
 
 
 def is_servo(element: Element, limits: Limits) -> bool:
-    """Whether an actuator, the only one of its joint, is no motor but has a target."""
+    """Return whether the only actuator of a joint has a target, and is no motor."""
     of_general = element.tag == _GENERAL and limits.drive.servo is not None
     return element.tag in _TAGS or of_general
 
 
 def delayed(value: float, step_s: float) -> Mapping[str, Numbers]:
-    """Return the attributes of an actuator whose commands act late [s], in a model of a time step [s]."""
-    # As many commands are kept as lie within the delay; between two of them it acts for a part of a step.
+    """Return the attributes of an actuator with a delay ``value`` [s]; ``step_s`` [s]: of the model."""
+    # One buffered command per step within the delay, and one more to interpolate within a step.
     kept = math.ceil(value / step_s - 1e-9) + 1
     return {"delay": value, "nsample": str(kept), "interp": "linear"}
 
@@ -69,7 +69,7 @@ def write_servo(
     refitted: Sequence[Refitted],
     step_s: float,
 ) -> Placed:
-    """Write what causes and re-fitted gains of one joint make of its only actuator, which has a target."""
+    """Write causes and re-fitted gains of one joint into its only actuator, which has a target."""
     placed = Placed()
     for those, why in _impossible(servo, causes, refitted):
         placed.refuse(those, why)
@@ -96,7 +96,7 @@ def write_servo(
 def _impossible(
     servo: Servo, causes: Sequence[Cause], refitted: Sequence[Refitted]
 ) -> Iterator[tuple[Sequence[Labelled], str]]:
-    """Yield causes and re-fitted gains that an actuator has no place for, and why."""
+    """Yield causes and re-fitted gains that an actuator cannot express, and why."""
     tag = f"<{servo.element.tag}>"
     has = "gains, a delay and a limit" if len(servo.known) > 1 else "a limit, its law is none here"
     yield (
@@ -110,7 +110,7 @@ def _impossible(
         )
     gains = [c for c in causes if c.effect in _OF_GAINS and c.effect in servo.known]
     if servo.limits.drive.servo is None:
-        # Its tag is that of one, but a filter of its command is none of the law of a controller.
+        # The tag is right, but the controller's law has no filter of its command.
         yield [*gains, *refitted], f"{tag} is no plain servo (timeconst)"
     elif servo.ratio_defaults:
         yield [*gains, *refitted], f"expected kv of the {tag} instead of a dampratio in defaults"
@@ -119,7 +119,7 @@ def _impossible(
 def _gains(
     servo: Servo, causes: Sequence[Cause], refitted: Sequence[Refitted]
 ) -> Mapping[str, Numbers]:
-    """Return the attributes of other gains; those of the file are as MuJoCo has them, defaults with them."""
+    """Return the attributes of changed gains; the file's gains are those of MuJoCo, with defaults."""
     stated = servo.limits.drive.servo
     assert stated is not None  # gains of others were refused
     by_cause, by_fit = _factors(causes), factors(refitted)
@@ -135,12 +135,12 @@ def _gains(
 
 
 def _factors(causes: Sequence[Cause]) -> tuple[float, float]:
-    """Return what gains of position and of speed are times those that the file says."""
+    """Return the factors on the file's gains of position and speed."""
     position = speed = 1.0
     for cause in causes:
         found = {name: value.value for name, value in cause.parameters.items()}
         if cause.effect == OTHER_GAINS[0]:
-            # Of a law of targets the second gain is that of the speed.
+            # In a law with position targets the second gain is that of speed.
             position *= 1 + found.get(OTHER_GAINS[1][0], 0.0)
             speed *= 1 + found.get(OTHER_GAINS[1][1], 0.0)
         else:

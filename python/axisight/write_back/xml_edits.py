@@ -1,4 +1,4 @@
-"""Attributes set and elements added in an XML text; every other byte stays."""
+"""Edits of an XML text that set attributes and add elements; every other byte stays."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _TAG = re.compile(rb"<[^\s/>]+(?:\s+[^\s=/>]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*/
 
 @dataclass
 class _Tag:
-    """What becomes of the start tag of one element: attributes, comments above it, its name."""
+    """Changes of one start tag: attributes, comments above it, its name."""
 
     element: Element
     attributes: dict[str, Numbers] = field(default_factory=dict)
@@ -28,7 +28,7 @@ class _Tag:
 
 @dataclass
 class Edits:
-    """Changes of one text, made together: places are those of the text as it was read."""
+    """Changes of one text; positions refer to the original text."""
 
     text: bytes
     name: str
@@ -44,9 +44,9 @@ class Edits:
         without: Collection[str] = (),
         tag: str = "",
     ) -> None:
-        """Set attributes of an element, with a comment on a line above it; more than once adds up.
+        """Set attributes of an element, with a comment on the line above; several calls add up.
 
-        ``without``: attributes that go; ``tag``: another name of an element without content.
+        ``without``: attributes to remove. ``tag``: new name, for an element without content.
         """
         self._tag(element)
         new = self._tags.setdefault(element.offset, _Tag(element))
@@ -58,7 +58,7 @@ class Edits:
     def add(
         self, element: Element, child: str, attributes: Mapping[str, Numbers], comment: str = ""
     ) -> None:
-        """Put a child with attributes first in an element, with a comment above it."""
+        """Insert a child with attributes as the first of an element, with a comment above it."""
         start, tag = self._tag(element)
         inner = self._indent(start) + b"  "
         made = f"<{child}/>".encode()
@@ -73,7 +73,7 @@ class Edits:
         self._replace(start, end, tag[:-2].rstrip() + b">" + more + self._indent(start) + closed)
 
     def result(self) -> bytes:
-        """Return the text with all changes."""
+        """Return the text with all changes. Raises RobotError for two changes at one place."""
         out, at = [], 0
         for start, end, new in sorted([*self._changes, *map(self._made, self._tags.values())]):
             if start < at:
@@ -83,7 +83,7 @@ class Edits:
         return b"".join([*out, self.text[at:]])
 
     def _made(self, new: _Tag) -> tuple[int, int, bytes]:
-        """Return where the start tag of an element stands, and what stands there instead."""
+        """Return start and end of an element's start tag, and its replacement."""
         start, old = self._tag(new.element)
         made = old
         for name in sorted(new.without):
@@ -109,21 +109,21 @@ class Edits:
         return found.start(), found.group()
 
     def _closed(self, element: Element, start: int) -> tuple[bytes, int]:
-        """Return the text of an element without content, which begins at ``start``, and where it ends."""
+        """Return the text of an element without content that begins at ``start``, and its end."""
         found = re.compile(rb"([^<]*)</[^>]*>").match(self.text, start)
         if found is None:
             raise RobotError(f"{element.where}: expected no content, its text cannot be edited")
         return found.group(1), found.end()
 
     def _indent(self, start: int) -> bytes:
-        """Return the line break and the blanks before an element; nothing where it follows another."""
+        """Return the line break and indentation before an element; empty if another comes first there."""
         line = self.text.rfind(b"\n", 0, start) + 1
         lead = self.text[line:start]
         return b"\n" + lead if line and not lead.strip() else b"\n"
 
 
 def _attribute(name: str) -> re.Pattern[bytes]:
-    """Return what finds an attribute with the blanks before it: its name and sign, and its value."""
+    """Return a pattern for an attribute with the blanks before it: name with sign, and value."""
     return re.compile(rb"(\s+" + re.escape(name.encode()) + rb"\s*=\s*)(?:\"[^\"]*\"|'[^']*')")
 
 
@@ -140,5 +140,5 @@ def _with(tag: bytes, name: str, value: Numbers) -> bytes:
 
 
 def _comment(text: str) -> bytes:
-    # Two hyphens would end it.
+    # Two hyphens would end the comment.
     return f"<!-- {text.replace('--', '- -')} -->".encode()

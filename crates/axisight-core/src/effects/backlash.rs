@@ -24,7 +24,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 3e-4,
             ..ParameterInfo::PLAIN
         },
-        // Teeth that damp in contact only, or grease and seals that damp on the way too.
+        // Teeth damp only in contact; grease and seals also damp inside the gap.
         ParameterInfo {
             name: "damped",
             unit: "1",

@@ -1,6 +1,7 @@
-//! A base that gives way: the arm rocks on springs.
+//! Compliant base: the arm rocks on springs.
 //!
-//! Twist about the first axis is the spring of its gear, with nothing that moves between the two.
+//! Twist about the first axis is not included. It equals the spring of that axis' gear, because
+//! nothing moves between the two.
 
 use super::{Acts, BaseJoint, EffectInfo, Experiment, Family, Kernel, ParameterInfo, Prior, Role, Scope};
 use crate::robot::Motion;

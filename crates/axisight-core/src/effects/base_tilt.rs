@@ -1,4 +1,4 @@
-//! Tilt of the base: gravity does not point where the simulator has it.
+//! Tilt of the base, which changes the direction of gravity.
 
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, Mark, ParameterInfo, PlantParameters, Scales, Scope};
 use axisight_scalar::Scalar;

@@ -13,7 +13,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Slope,
     shown_by: &[Experiment::Poses],
     formula: Formula::LINEAR,
-    // A cable that hardly pulls harder as it is stretched, and is at rest far away, pulls like a constant.
+    // A soft cable with a distant rest angle pulls like a constant torque.
     plainer: Some(Plainer {
         law: "torque_offset",
         adds: &["stiffness_nm_rad"],

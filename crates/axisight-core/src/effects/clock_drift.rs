@@ -1,4 +1,4 @@
-//! Controller and logger that run on clocks of their own.
+//! Clocks of controller and logger that drift apart.
 
 use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, ParameterInfo, Scope};
 use axisight_scalar::Scalar;

@@ -1,4 +1,4 @@
-//! Gains of the machine's controller that are not the stated ones.
+//! Controller gains of the machine that differ from the stated gains.
 
 use super::{Acts, EffectInfo, Experiment, Family, Kernel, Mark, ParameterInfo};
 use axisight_scalar::Scalar;
@@ -27,7 +27,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     parameters: &[
         change("relative_proportional"),
         change("relative_integral"),
-        // Of the position loop around a cascade's speed loop; others have none.
+        // Gain of the position loop of a cascade; other controllers do not have it.
         change("relative_position"),
     ],
     ..EffectInfo::PLAIN

@@ -14,8 +14,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     linear: Linear::Path,
     shown_by: &[Experiment::WideBand],
     formula: Formula::LAG,
-    // Well damped, a delay of 2 D T up to the third power of frequency. Loops are as frequent as delays, and half of
-    // them are not damped like one.
+    // With good damping it equals a delay of 2 D T up to the third power of frequency. Current
+    // loops are as common as delays, and half of them have this damping.
     resembles: Some(Resembles {
         law: "input_delay",
         size: "time_constant_s",

@@ -1,4 +1,4 @@
-//! Encoder on the joint whose disc is not centred.
+//! Joint encoder with an eccentric disc.
 
 use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo};
 use axisight_scalar::Scalar;

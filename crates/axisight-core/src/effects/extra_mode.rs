@@ -1,4 +1,4 @@
-//! A mode that the simulator does not have: something on the joint swings on a spring.
+//! A mode that the simulator lacks: a mass that swings on a spring at the joint.
 
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Joint, Kernel, ParameterInfo, Prior, Role};
 use axisight_scalar::Scalar;
@@ -66,10 +66,10 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Mode<S> {
-    /// Acceleration of what swings; how far it is behind the joint and its speed are the states.
+    /// Acceleration of the swinging mass. Its states are its lag behind the joint and its speed.
     fn acceleration(&self, joint: &Joint<'_, S>) -> S {
         let [behind, speed] = joint.internal else {
-            // At rest it hangs still.
+            // At rest the mass does not accelerate.
             return S::zero();
         };
         let damper = self.damping * self.rate;

@@ -35,7 +35,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             sizes: "judgement: from the length of a short log to the hour that a gear takes",
             ..ParameterInfo::PLAIN
         },
-        // F_0: a machine that is warm as modelled begins with more.
+        // F_0: if the warm machine is modelled, the friction starts higher.
         ParameterInfo {
             name: "cold_nm_s_rad",
             unit: "Nm s/rad",
@@ -72,7 +72,7 @@ impl<S: Scalar> Kernel<S> for Warmup<S> {
     }
 
     fn motor_torque(&self, motor: &Motor<'_, S>) -> S {
-        // How far it has come: 1 - e^(-t / T), a state of its own.
+        // Progress of the warm-up, 1 - e^(-t / T), which is the effect's own state.
         let done = motor.internal.first().map_or_else(S::zero, |z| *z);
         -(self.viscous.fma(done, self.cold) * motor.speed)
     }

@@ -1,4 +1,4 @@
-//! Gear hysteresis: a spring beside the gear's own slips, and remembers.
+//! Gear hysteresis: a slipping spring with memory beside the gear's own spring.
 
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Kernel, LawOf, ParameterInfo, Prior, Role, Spring, SpringChange};
 use axisight_scalar::Scalar;
@@ -36,7 +36,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             sizes: "judgement: gears lose their friction over 0.1 to 10 minutes of arc",
             ..ParameterInfo::PLAIN
         },
-        // Of a stiffness measured with small motions all, of one measured with large ones nothing.
+        // One if the stiffness was measured with small motions, zero if with large ones.
         ParameterInfo {
             name: "included",
             unit: "1",
@@ -48,8 +48,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             sizes: "judgement: a stiffness was measured with small motions, or with large ones",
             ..ParameterInfo::PLAIN
         },
-        // How suddenly each element slips, and how far apart they do: the more, the less small loops creep
-        // under a load.
+        // How suddenly each element slips, and how far apart the elements slip. The larger the
+        // value, the less small loops creep under a load.
         ParameterInfo {
             name: "sharpness",
             unit: "1",
@@ -61,7 +61,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             sizes: "judgement: Dahl and springs with sliders are both met",
             ..ParameterInfo::PLAIN
         },
-        // What it remembers of the motion before a run.
+        // Strain that the motion before the run has left.
         ParameterInfo {
             name: "strain_at_rest",
             unit: "1",
@@ -77,13 +77,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     ..EffectInfo::PLAIN
 };
 
-/// Deflections that elements slip at, as shares of their mean, about it: evenly from nought, if most sudden.
+/// Offsets of the elements' slip deflections from their mean, relative to it. At full sharpness the
+/// deflections are evenly spaced from zero.
 const APART: [f64; 4] = [-0.6, -0.2, 0.2, 0.6];
 
-/// Share of Dahl's way back that a strain takes beyond its yield.
+/// Factor on the part of a strain beyond its yield, for a return slower than Dahl's.
 const SLOWLY: f64 = 0.1;
 
-/// What is above zero.
+/// The positive part of `x`.
 fn over<S: Scalar>(x: S) -> S {
     x.if_positive(x, S::zero())
 }
@@ -107,7 +108,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Hysteresis<S> {
-    /// Deflection at which an element slips.
+    /// Deflection at which the element with the offset `apart` slips.
     fn slips_at(&self, apart: f64) -> S {
         self.deflection * (self.sharpness * apart + 1.0)
     }
@@ -119,7 +120,8 @@ impl<S: Scalar> Kernel<S> for Hysteresis<S> {
     }
 
     fn gear_torque(&self, spring: &Spring<'_, S>) -> S {
-        // From what the strains are at rest, where the gear holds the load whatever they are.
+        // The states count from the strains at rest, where the gear holds the load whatever the
+        // strains are.
         let slipping = spring
             .internal
             .iter()
@@ -132,8 +134,8 @@ impl<S: Scalar> Kernel<S> for Hysteresis<S> {
     fn gear_rates(&self, spring: &Spring<'_, S>, rates: &mut [S]) {
         for ((change, out), apart) in spring.internal.iter().zip(rates).zip(APART) {
             let z = *change + self.strain_at_rest;
-            // No strain is beyond its yield but by a step too long for the corner: from there it comes back slowly,
-            // however long the step.
+            // A strain is beyond its yield only after a step that is too long for the corner. From
+            // there it returns slowly, however long the step is.
             let beyond = over(z - 1.0) - over(-z - 1.0);
             let z = beyond.fma(S::constant(SLOWLY - 1.0), z);
             let short = z.square().square() - 1.0;

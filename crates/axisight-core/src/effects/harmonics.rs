@@ -3,14 +3,14 @@
 use super::formulas::harmonic;
 use axisight_scalar::Scalar;
 
-/// `sum_i c_i cos(n_i phi) + s_i sin(n_i phi)`.
+/// The sum `sum_i c_i cos(n_i phi) + s_i sin(n_i phi)`.
 #[derive(Debug, Clone)]
 pub(super) struct Harmonics<S> {
     terms: Vec<[S; 3]>,
 }
 
 impl<S: Scalar> Harmonics<S> {
-    /// From triples `[n, c, s]`; a term of order zero is switched off.
+    /// A sum from triples `[n, c, s]`; a term of order zero is switched off.
     pub(super) fn new(p: &[S]) -> Self {
         let terms = p
             .chunks_exact(3)

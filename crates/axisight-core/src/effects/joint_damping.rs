@@ -1,4 +1,4 @@
-//! Gear damping other than the simulator's.
+//! Gear damping that differs from the simulator's.
 
 use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, Linear, ParameterInfo, PlantParameters, StandsFor};
 use axisight_scalar::Scalar;

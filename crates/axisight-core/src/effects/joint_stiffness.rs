@@ -1,4 +1,4 @@
-//! Gear stiffness other than the simulator's.
+//! Gear stiffness that differs from the simulator's.
 
 use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, Linear, Mark, ParameterInfo, PlantParameters, StandsFor};
 use axisight_scalar::Scalar;

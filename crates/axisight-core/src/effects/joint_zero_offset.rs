@@ -1,4 +1,4 @@
-//! Zero of a joint angle other than the simulator's: the arm beyond stands turned.
+//! Zero of a joint angle that differs from the simulator's, which turns the arm beyond the joint.
 
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, PlantParameters, Scales};
 use axisight_scalar::Scalar;

@@ -1,4 +1,4 @@
-//! Centre of mass of one link other than the simulator's.
+//! Centre of mass of one link that differs from the simulator's.
 
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, PlantParameters, Scales, shift};
 use axisight_scalar::Scalar;

@@ -1,4 +1,5 @@
-//! A length of a link other than the simulator's: what it carries lies elsewhere.
+//! Length of a link that differs from the simulator's, which displaces everything that the link
+//! carries.
 
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, PlantParameters, Scales, shift};
 use axisight_scalar::Scalar;

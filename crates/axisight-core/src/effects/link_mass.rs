@@ -1,4 +1,4 @@
-//! Mass of one link other than the simulator's.
+//! Mass of one link that differs from the simulator's.
 
 use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, PlantParameters, Scales, StandsFor};
 use axisight_scalar::Scalar;

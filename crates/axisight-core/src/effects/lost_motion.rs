@@ -1,4 +1,4 @@
-//! Gear that gives way around its middle: play that carries part of the torque.
+//! Gear that is soft around its middle: backlash that carries part of the torque.
 
 use super::{Acts, EffectInfo, Experiment, Family, Kernel, LawOf, ParameterInfo, Prior, Role, Spring, SpringChange};
 use axisight_scalar::Scalar;
@@ -20,7 +20,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             name: "softness",
             unit: "1",
             lower: 0.0,
-            // All but play, which a spring at rest could not carry a load with.
+            // At one the law is backlash, where this spring cannot carry a load at rest.
             upper: 0.98,
             typical: 0.5,
             ..ParameterInfo::PLAIN
@@ -37,7 +37,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             sizes: "judgement: gears are soft over 0.1 to 10 minutes of arc",
             ..ParameterInfo::PLAIN
         },
-        // Teeth come into contact one after another, or all at once.
+        // Small if all teeth come into contact at once, large if they come into contact one after
+        // another.
         ParameterInfo {
             name: "rounding",
             unit: "1",
@@ -58,7 +59,7 @@ struct Soft<S> {
     softness: S,
     within: S,
     corner: S,
-    /// Half, and what makes the slope of the middle one.
+    /// Half of the factor that gives the middle a slope of one.
     scale: S,
 }
 

@@ -1,7 +1,7 @@
-//! Effects: what a machine does and a simulator may not model.
+//! The library of effects: what a machine may have and a simulator may lack.
 //!
-//! One file per effect states all that is known of it: its parameters, the value at which it
-//! vanishes, where it acts, its equation and its source, and what others have to know of it
+//! Each effect has its own file, which states everything known about it: its parameters, the value
+//! at which it vanishes, where it acts, its equation and source, and its relations to other effects
 //! ([`EffectInfo`]). A new effect is a new file and one line in the table below. Equations that
 //! other models share are in [`formulas`].
 
@@ -18,7 +18,7 @@ pub use axisight_plant::formulas;
 
 use axisight_scalar::Scalar;
 
-/// Speed of the motor below which a dry friction is rounded off.
+/// Motor speed below which the sign of a dry friction is rounded.
 const SMOOTHING: ParameterInfo = ParameterInfo {
     name: "smoothing_rad_s",
     unit: "rad/s",
@@ -32,7 +32,7 @@ const SMOOTHING: ParameterInfo = ParameterInfo {
     sizes: "judgement: how sharply a sign turns, over machines and those who write it, a factor of twenty either way (95 %)",
 };
 
-/// Speed of the motor over which a dry friction falls from standstill.
+/// Motor speed over which a dry friction falls from its value at standstill.
 const STRIBECK_SPEED: ParameterInfo = ParameterInfo {
     name: "stribeck_speed_rad_s",
     unit: "rad/s",
@@ -46,7 +46,7 @@ const STRIBECK_SPEED: ParameterInfo = ParameterInfo {
     ..ParameterInfo::PLAIN
 };
 
-/// How far something lies elsewhere in its link, along one axis of its frame.
+/// A displacement along one axis of the link's frame, as a parameter.
 const fn shift(name: &'static str) -> ParameterInfo {
     ParameterInfo {
         name,

@@ -1,4 +1,4 @@
-//! Motor inertia other than the simulator's.
+//! Motor inertia that differs from the simulator's.
 
 use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo, PlantParameters, Scales, StandsFor};
 use axisight_scalar::Scalar;

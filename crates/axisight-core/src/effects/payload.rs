@@ -31,7 +31,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     shown_by: &[Experiment::Poses],
     formula: Formula::RIGID_BODY,
     scales: Some(Scales::Carriers),
-    // A load, which every arm is there to carry, beside a link that is not as it was drawn: the link stands beside it.
+    // Every arm carries loads, so a load is more common than an error in a link.
     usual_odds: 3.0,
     parameters: &[
         ParameterInfo {
@@ -80,7 +80,7 @@ fn combined<S: Scalar>(body: &Body<S>, mass: S, position: &[S; 3]) -> Body<S> {
     let total = body.mass + mass;
     let share = mass / total;
     let arm: [S; 3] = std::array::from_fn(|i| position[i] - body.com[i]);
-    // Reduced mass of the pair; zero with the payload.
+    // Reduced mass of body and payload; zero without a payload.
     let reduced = body.mass * share;
     let [x, y, z] = arm;
     let spread = [

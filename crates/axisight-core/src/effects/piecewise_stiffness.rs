@@ -17,7 +17,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     shown_by: &[Experiment::Amplitudes],
     law_of: Some(LawOf::Gear),
     spring: Some(SpringChange { sums: &[&["within"], &["within", "step"]], without_middle: "backlash" }),
-    // A knee that nothing reaches, or all pass.
+    // If no motion reaches the knee, or every motion passes it, the law is a linear spring.
     plainer: Some(Plainer {
         law: "joint_stiffness",
         adds: &["step", "knee_rad"],
@@ -33,7 +33,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             typical: 0.3,
             ..ParameterInfo::PLAIN
         },
-        // Of a stiffness measured with large motions, or with others than the robot makes.
+        // Not zero if the stiffness was measured with large motions, or with motions other than the
+        // robot's.
         ParameterInfo {
             name: "within",
             unit: "1",

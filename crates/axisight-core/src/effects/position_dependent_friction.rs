@@ -28,7 +28,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     shown_by: &[Experiment::Poses],
     formula: Formula::FRICTION,
     law_of: Some(LawOf::DryFriction),
-    // A law that holds one which is the same everywhere cannot leave more than it.
+    // This law contains uniform friction, so its fit must not leave a larger loss than that law.
     begun_from: Some(BegunFrom {
         law: "coulomb_friction",
         takes: &[("coulomb_nm", "mean_nm"), ("smoothing_rad_s", "smoothing_rad_s"), ("arm_share", "arm_share")],

@@ -1,4 +1,4 @@
-//! Encoder of few lines: positions come in steps.
+//! Encoder with few lines, so that positions come in steps.
 
 use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo};
 use axisight_scalar::Scalar;

@@ -1,4 +1,4 @@
-//! Supply whose voltage gives way under power, and the drive's torque with it.
+//! Supply voltage that sags under power, which lowers the drive's torque.
 
 use super::{Acts, EffectInfo, Experiment, Family, Kernel, Motor, ParameterInfo, Prior, Role};
 use axisight_scalar::Scalar;
@@ -38,7 +38,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     ..EffectInfo::PLAIN
 };
 
-/// Of the torque something is always left.
+/// Largest share of the torque that can be lost.
 const MOST: f64 = 0.95;
 
 struct Sag<S> {

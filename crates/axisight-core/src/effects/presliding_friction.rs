@@ -16,14 +16,15 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     shown_by: &[Experiment::Speeds],
     formula: Formula::FRICTION,
     law_of: Some(LawOf::DryFriction),
-    // Whoever writes dry friction rounds its corner over speed or over a small way; where it yields its way is sure.
+    // Laws of dry friction round the corner over speed or over a small travel. If the friction
+    // really yields, the logs determine this travel.
     plainer: Some(Plainer {
         law: "coulomb_friction",
         adds: &["presliding_rad"],
         likelier: 10.0,
         shown: Shown::Sizes,
     }),
-    // How friction falls once it slips shows only beside how it yields before.
+    // The fall of friction after breakaway shows only once the fit includes the yield before it.
     later: Some(Later {
         amplitude: "static_ratio",
         begin: 1.3,
@@ -77,8 +78,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             sizes: "judgement: from a tenth to some hundred times the typical time",
             ..ParameterInfo::PLAIN
         },
-        // T_r: none in the paper. With one, no bristle slips faster, and a fixed step that is not
-        // much longer follows.
+        // T_r is not in the paper. It limits the speed of the bristles, so that a fixed step of
+        // about this length can follow them.
         ParameterInfo {
             name: "relaxation_s",
             unit: "s",
@@ -116,7 +117,7 @@ pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
 }
 
 impl<S: Scalar> Presliding<S> {
-    /// Deflection of the bristles, in units of the one at which they slip, and its rate.
+    /// Deflection of the bristles, relative to that at which they slip, and its rate.
     fn bristles(&self, motor: &Motor<'_, S>) -> (S, S) {
         let level = stribeck_level(S::one(), self.excess, self.inverse_speed, motor.speed);
         match motor.internal.first() {
@@ -124,7 +125,7 @@ impl<S: Scalar> Presliding<S> {
                 let fast = motor.speed.abs();
                 (*z, (motor.speed - fast * (*z / level)) / self.relaxation.fma(fast, self.travel))
             }
-            // Without a state of its own (inverse dynamics): slipping all the time.
+            // Without states (inverse dynamics) the bristles slip all the time.
             None => (motor.speed.if_positive(level, -level), S::zero()),
         }
     }

@@ -3,7 +3,7 @@
 use super::{Joint, Kernel, Mark, Motor, ParameterInfo, Prior, Role};
 use axisight_scalar::Scalar;
 
-/// Share of a friction that the arm feels, behind the gear.
+/// Share of a friction that acts on the arm, behind the gear.
 pub(super) const ARM_SHARE: ParameterInfo = ParameterInfo {
     name: "arm_share",
     unit: "1",
@@ -17,9 +17,9 @@ pub(super) const ARM_SHARE: ParameterInfo = ParameterInfo {
     ..ParameterInfo::PLAIN
 };
 
-/// A friction without a memory.
+/// A friction without states.
 pub(super) trait Friction<S: Scalar>: Send + Sync + 'static {
-    /// Torque on a motor [Nm], against its motion, at its angle [rad] and speed [rad/s].
+    /// Torque on a motor [Nm], against its motion, at an angle [rad] and a speed [rad/s].
     fn torque(&self, angle: S, speed: S) -> S;
 }
 
@@ -28,8 +28,8 @@ struct Sides<S, F> {
     arm_share: S,
 }
 
-/// The kernel of a friction, with a share of it behind the gear: there by angle and speed of the joint,
-/// as a motor without elasticity would turn.
+/// The kernel of a friction, with the share `arm_share` behind the gear. There it uses the angle
+/// and speed of the joint, converted to those of a motor on a rigid gear.
 pub(super) fn on_sides<S: Scalar>(friction: impl Friction<S>, arm_share: S) -> Box<dyn Kernel<S>> {
     Box::new(Sides {
         friction,

@@ -17,7 +17,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     shown_by: &[Experiment::Speeds],
     formula: Formula::FRICTION,
     law_of: Some(LawOf::DryFriction),
-    // An excess that never shows, as the sign turns over a wider range of speeds, takes up how a corner is rounded.
+    // If the sign turns over a wider range of speeds than the excess, the excess never shows and
+    // only describes how the corner is rounded.
     plainer: Some(Plainer {
         law: "coulomb_friction",
         adds: &["excess_nm", "stribeck_speed_rad_s"],

@@ -1,4 +1,4 @@
-//! Torque constant other than the drive believes.
+//! Torque constant that differs from the drive's value.
 
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, ParameterInfo};
 use axisight_scalar::Scalar;

@@ -19,5 +19,5 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     ..EffectInfo::PLAIN
 };
 
-/// Of a torque as it is reported, which is what logs hold.
+/// The kernel of a torque offset, here of the reported torque, which is the torque in logs.
 pub(super) use super::torque_offset::kernel;

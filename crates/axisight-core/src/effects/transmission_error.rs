@@ -39,8 +39,8 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         },
         wave("cosine_rad"),
         wave("sine_rad"),
-        // One where the gear conserves power; none where the torque passes at the nominal ratio, as
-        // many simulators have it and lossy gears may.
+        // One if the gear conserves power. Zero if the torque passes at the nominal ratio, as in
+        // many simulators and possibly in lossy gears.
         ParameterInfo {
             name: "returned",
             unit: "1",
@@ -53,7 +53,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         },
         wave("second_cosine_rad"),
         wave("second_sine_rad"),
-        // m: a wave at twice the first is a shape of its own.
+        // m: a second wave at twice the order gives the error a shape of its own.
         ParameterInfo {
             name: "second_ratio",
             unit: "1",

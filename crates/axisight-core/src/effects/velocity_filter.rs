@@ -1,4 +1,4 @@
-//! A filter through which the controller takes the speed.
+//! A filter of the speed in the controller.
 
 use super::{Acts, EffectInfo, Experiment, Family, Kernel, ParameterInfo};
 use axisight_scalar::Scalar;

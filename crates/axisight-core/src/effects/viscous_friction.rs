@@ -1,4 +1,4 @@
-//! Viscous friction beyond the simulator's.
+//! Viscous friction in addition to the simulator's.
 
 use super::{Absorber, Acts, Change, EffectInfo, Experiment, Family, Formula, Kernel, Linear, Motor, ParameterInfo, StandsFor};
 use axisight_scalar::Scalar;

@@ -1,4 +1,4 @@
-//! From the names of effects to a plant, and what needs more than one of them.
+//! Plants, linearizations and integrators for robots with effects by name.
 
 use crate::effects::{self, EffectError, EffectInfo};
 use crate::robot::{EffectSetting, Parameter, RobotDescription};
@@ -8,13 +8,14 @@ use axisight_plant::plant::{
 };
 use axisight_scalar::Scalar;
 
-/// The plant of `robot` with some parameters replaced and some effects added.
+/// The plant of `robot` with some parameters replaced and the effects `settings` added.
 ///
-/// Effects of the robot itself act too, but for those that `settings` replace: same effect,
+/// The robot's own effects act too, except those that `settings` replaces: the same effect at the
 /// same place.
 ///
 /// # Errors
-/// [`PlantError`] when an effect is unknown, misplaced or has the wrong parameters.
+/// [`PlantError`] if an effect is unknown or misplaced, has the wrong parameters, or the plant
+/// cannot be built.
 #[inline(never)]
 pub fn assemble<S: Scalar>(
     robot: &RobotDescription,
@@ -51,13 +52,13 @@ pub fn linearize(
     plant::linearize(&plain, &seeded(robot, settings)?, driven)
 }
 
-/// Integrator of `plant`, which is that of `robot` with `settings`, for any method.
+/// Integrator of `plant`, which must be that of `robot` with `settings`, for any method.
 ///
-/// Implicit methods take one run at a time and carry no derivatives; for other scalars this is
+/// Implicit methods integrate one run without derivatives. For other scalars this function equals
 /// [`Stepper::new`].
 ///
 /// # Errors
-/// [`PlantError`] as for the plant itself.
+/// [`PlantError`] as for [`assemble`].
 #[inline(never)]
 pub fn stepper<S: Scalar>(
     plant: &Plant<S>,

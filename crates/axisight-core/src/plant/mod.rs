@@ -1,4 +1,4 @@
-//! Plants of robots with effects by name.
+//! Plants of robots, with effects by name.
 
 mod assemble;
 

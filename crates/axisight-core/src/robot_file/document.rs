@@ -1,11 +1,11 @@
-//! The document walked with spans: tables and values that know their key and line.
+//! Access to a TOML document with spans: tables and values that know their key and line.
 
 use super::error::RobotError;
 use crate::robot::description::Bound;
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
 
-/// A table of the document and where it stands.
+/// A table of the document, with its path and position.
 pub(super) struct Section<'a> {
     pub(super) text: &'a str,
     pub(super) entries: &'a DeTable<'a>,
@@ -23,7 +23,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Refuse keys that are not `known`; the first in the file is named.
+    /// Refuse keys that are not in `known`. The error names the first one in the file.
     pub(super) fn only(&self, known: &[&str]) -> Result<(), RobotError> {
         let is_unknown = |key: &&Spanned<_>| !known.contains(&AsRef::<str>::as_ref(key.get_ref()));
         let unknown = self.entries.keys().filter(is_unknown);
@@ -59,7 +59,7 @@ impl<'a> Section<'a> {
             .number(bound, unit)
     }
 
-    /// A switch that may be left out.
+    /// A boolean value; `otherwise` if the key is missing.
     pub(super) fn flag(&self, name: &str, otherwise: bool) -> Result<bool, RobotError> {
         let Some(entry) = self.find(name) else {
             return Ok(otherwise);
@@ -81,7 +81,7 @@ impl<'a> Section<'a> {
     }
 }
 
-/// A value of the document, its key and where it stands.
+/// A value of the document, with its key and position.
 pub(super) struct Entry<'a> {
     pub(super) text: &'a str,
     pub(super) value: &'a DeValue<'a>,
@@ -109,7 +109,7 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// [`Entry::invalid`] with the value as the file has it.
+    /// [`Entry::invalid`] with the value as it is in the file.
     pub(super) fn refuse(&self, expected: String) -> RobotError {
         self.invalid(expected, describe(self.value))
     }
@@ -215,7 +215,7 @@ fn describe(value: &DeValue) -> String {
     }
 }
 
-/// Line of a byte of the text, from 1.
+/// Line of a byte of the text, counted from 1.
 pub(super) fn line_at(text: &str, byte: usize) -> usize {
     1 + text.bytes().take(byte).filter(|b| *b == b'\n').count()
 }

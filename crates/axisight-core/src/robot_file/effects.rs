@@ -1,4 +1,5 @@
-//! What version 2 of the format adds: effects of the simulator, tolerances of its parameters.
+//! Additions of version 2 of the format: effects of the simulator, and tolerances of its
+//! parameters.
 
 use super::document::{Entry, Section};
 use super::error::RobotError;
@@ -6,7 +7,7 @@ use crate::effects::{Acts, EFFECTS, EffectInfo, Scope};
 use crate::robot::description::{Bound, Controller};
 use crate::robot::{EffectSetting, Place, RobotDescription};
 
-/// Quantities that may have a tolerance, beside gains.
+/// Quantities that may have a tolerance, besides gains.
 const TOLERATED: [&str; 6] = [
     "mass",
     "inertia_scale",
@@ -16,7 +17,8 @@ const TOLERATED: [&str; 6] = [
     "viscous_friction",
 ];
 
-/// Gains that may have one: those of a controller of targets, of a cascade its integral where it has one.
+/// Gains that may have a tolerance: those of controllers with position references. A cascade has an
+/// integral gain only if it is not zero.
 fn tolerated_gains(controller: &Controller) -> &'static [&'static str] {
     match controller {
         Controller::PdPosition { .. } => &["kp", "kd"],
@@ -109,7 +111,7 @@ fn read_place(
     }
 }
 
-/// An axis of the robot, from 0, on which the effect can act.
+/// An axis of the robot, counted from 0, on which the effect can act.
 fn axis_number(
     entry: &Entry,
     info: &EffectInfo,
@@ -135,7 +137,7 @@ fn axis_number(
     Ok(index)
 }
 
-/// Whether a link moves with an axis and not with the next one.
+/// Whether a link moves with an axis but not with the next axis.
 fn has_link(robot: &RobotDescription, index: usize) -> bool {
     let places: Vec<usize> = robot.driven().map(|(place, ..)| place).collect();
     let end = places.get(index + 1).copied().unwrap_or(robot.joints.len());

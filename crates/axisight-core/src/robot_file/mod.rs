@@ -1,4 +1,4 @@
-//! Robot files: TOML text to a description, faults named with their line.
+//! Robot files: reads a description from TOML text, and reports errors with their line.
 
 mod document;
 mod effects;

@@ -1,9 +1,10 @@
 //! Reads a robot from TOML text, schemas `axisight.robot/1` and `axisight.robot/2`.
 //!
-//! Files come from elsewhere, so nothing is guessed: whatever is unknown,
-//! missing or unphysical is refused with its key, its line and what was
-//! expected. The document is walked with spans rather than deserialized,
-//! because a derived deserializer cannot say on which line a key is missing.
+//! Nothing in a file is guessed. Unknown, missing or unphysical values are refused with the key,
+//! the line and the expected value.
+//!
+//! The reader walks the document with spans, because a derived deserializer cannot report the line
+//! of a missing key.
 
 use super::document::{Entry, Section, line_at, one_of};
 use super::effects::{read_effects, read_tolerances};
@@ -16,7 +17,7 @@ use crate::robot::description::{
 use std::sync::Arc;
 use toml::de::DeTable;
 
-/// Schemas by their number.
+/// Names of the schemas; version 1 comes first.
 const SCHEMAS: [&str; 2] = ["axisight.robot/1", "axisight.robot/2"];
 const AXIS_TOLERANCE: f64 = 1e-6;
 
@@ -30,7 +31,7 @@ const ROOT_KEYS: &[&str] = &[
     "sensor",
     "operating_point",
 ];
-/// Keys that version 2 adds.
+/// Keys of version 2 only.
 const NEWER_ROOT_KEYS: &[&str] = &["effect", "tolerances"];
 const JOINT_KEYS: &[&str] = &[
     "name",
@@ -49,9 +50,8 @@ const DRIVE_KEYS: &[&str] = &["gear_ratio", "motor_inertia", "viscous_friction"]
 /// Read a robot description from TOML text.
 ///
 /// # Errors
-/// [`RobotError`] for the first fault: text that is no TOML, another schema,
-/// unknown or missing keys, wrong types or shapes, and values that are not
-/// finite or not physical.
+/// [`RobotError`] for the first error in the file: invalid TOML, an unknown schema, unknown or
+/// missing keys, wrong types or shapes, and values that are not finite or not physical.
 pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
     let document = DeTable::parse(text).map_err(|error| syntax_error(text, &error))?;
     let root = Section {
@@ -60,7 +60,7 @@ pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
         path: String::new(),
         start: 0,
     };
-    // The schema first: the keys of another schema would all seem unknown.
+    // The schema comes first, because every key of another schema would count as unknown.
     let version = read_schema(&root)?;
     if version == 1 {
         root.only(ROOT_KEYS)?;
@@ -100,7 +100,7 @@ pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
 
 fn syntax_error(text: &str, error: &toml::de::Error) -> RobotError {
     let span = error.span().unwrap_or_default();
-    // At the end of the text the parser points past the last line.
+    // At the end of the text, the parser points behind the last line.
     let line = line_at(text, span.start).min(text.lines().count().max(1));
     let mut message = error.message().to_owned();
     if let Some(piece) = text.get(span).filter(|piece| !piece.trim().is_empty()) {
@@ -109,7 +109,7 @@ fn syntax_error(text: &str, error: &toml::de::Error) -> RobotError {
     RobotError::Syntax { line, message }
 }
 
-/// Number of the schema, from 1.
+/// Version of the schema, counted from 1.
 fn read_schema(root: &Section) -> Result<usize, RobotError> {
     let [first, second] = SCHEMAS;
     let expected = format!("\"{first}\" or \"{second}\"");
@@ -121,7 +121,7 @@ fn read_schema(root: &Section) -> Result<usize, RobotError> {
     }
 }
 
-/// Faults that no joint shows on its own.
+/// Checks of the robot that need more than one joint.
 fn check_chain(
     robot: &RobotDescription,
     joint_list: &Entry,
@@ -216,8 +216,8 @@ fn read_compliance(
     driven: bool,
 ) -> Result<Option<Compliance>, RobotError> {
     let has = |name| section.find(name).is_some();
-    // A driven joint without either has a rigid transmission; one without the
-    // other is more likely a slip than a gear that does not damp.
+    // A driven joint without both keys has a rigid transmission. One key alone is more likely a
+    // mistake than a gear without damping.
     if driven && !has("stiffness") && !has("damping") {
         return Ok(None);
     }
@@ -262,7 +262,7 @@ fn read_drive(section: &Section, motion: Motion, rigid: bool) -> Result<Drive, R
         Motion::Revolute => "rad/rad",
         Motion::Prismatic => "m/rad",
     };
-    // A motor on a compliant gear has an equation of motion of its own.
+    // A motor on a compliant gear has its own equation of motion, so its inertia must be positive.
     let rotor = if rigid {
         Bound::NotNegative
     } else {
@@ -308,7 +308,7 @@ fn read_controller(
         ("pd_position", ControllerKind::PdPosition),
         ("cascade_position", ControllerKind::CascadePosition),
     ];
-    // Files of the first version have the kinds of the first version.
+    // Version 1 does not have the last two kinds.
     let kinds = &kinds[..if version == 1 {
         kinds.len() - 2
     } else {
@@ -342,7 +342,7 @@ fn read_controller(
             ];
             let steps = ["step", "step_inertia"];
             section.only(&[&["kind", "kp", "kd"][..], &switches, &steps].concat())?;
-            // One without the other says half of what a simulator does.
+            // One key without the other describes only half of a simulator's step.
             let stepped = if steps.iter().any(|key| section.find(key).is_some()) {
                 Some(Stepped {
                     step: section.number(steps[0], Bound::Positive, "s")?,
@@ -384,7 +384,7 @@ fn read_controller(
     }
 }
 
-/// A cascade, told positions or speeds; without `ki` its velocity loop is P.
+/// A cascade with references of positions or speeds. Without `ki` its velocity loop is a P loop.
 fn read_cascade(
     section: &Section,
     n_axes: usize,

@@ -1,10 +1,11 @@
 //! Many runs of one robot: lanes in lock-step on each thread, groups of lanes over threads.
 //!
-//! Groups are cut by run number, so that results do not depend on the number of threads.
-//! Runs in a group take the same steps: with fixed steps and with the linear plant a run has
-//! the same bits in any group; with an error-controlled method the group takes the shortest
-//! step any of its runs asks for, and a run differs from itself alone by less than the
-//! tolerance allows.
+//! Groups are formed by run number, so results do not depend on the number of threads. All runs of
+//! a group take the same steps:
+//!
+//! * With fixed steps, and with the linear plant, a run has the same bits in any group.
+//! * With an error-controlled method, a group takes the shortest step that any of its runs needs. A
+//!   run then differs from the same run alone by less than the tolerance allows.
 
 use super::linear::{LinearPlant, LinearPlantError, simulate_linear};
 use crate::plant::{Plant, PlantError, assemble, stepper};
@@ -17,19 +18,19 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-/// Runs in lock-step: two registers of four hide the latency of one another's operations.
+/// Runs in lock-step: two registers of four hide each other's latency.
 const LANES: usize = 8;
 
-/// Equations the plant follows.
+/// Equations of the plant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Model {
-    /// All of it.
+    /// The full equations.
     Nonlinear,
-    /// Linearized at the start, ripple and the torque path as they are.
+    /// The plant linearized at the start, with ripple and torque path in full.
     Linear,
 }
 
-/// Input of a batch, `(n_samples, n_axes)` row-major per run.
+/// Input of a batch, row-major `(n_samples, n_axes)` for each run.
 #[derive(Debug, Clone, Copy)]
 pub enum BatchInput<'a> {
     /// Motor-side velocity references [rad/s].
@@ -46,35 +47,35 @@ impl<'a> BatchInput<'a> {
     }
 }
 
-/// Runs to simulate.
+/// The runs of a batch.
 #[derive(Debug, Clone, Copy)]
 pub struct Batch<'a> {
-    /// Robot with its controller.
+    /// Robot, with its controller.
     pub robot: &'a RobotDescription,
-    /// Effects.
+    /// Effects to add to the robot's own.
     pub settings: &'a [EffectSetting<f64>],
     /// Driven joint angles at the start [rad]: one set for all runs, or one per run. The linear
-    /// plant has one, where it is linearized.
+    /// plant needs one set, at which it is linearized.
     pub start: &'a [Vec<f64>],
-    /// Inputs by run.
+    /// Inputs, one per run.
     pub input: BatchInput<'a>,
-    /// Position noise by run, shaped like the inputs; empty for none [rad].
+    /// Position noise [rad], one array per run, shaped like the inputs; empty for none.
     pub noise: &'a [Vec<f64>],
     /// Step of the position sensor [rad]; zero for none.
     pub resolution: f64,
-    /// Equations.
+    /// Equations of the plant.
     pub model: Model,
     /// Integrator.
     pub method: Method,
-    /// Set by another thread to end the runs early.
+    /// Flag by which another thread ends the runs early.
     pub cancel: Option<&'a AtomicBool>,
 }
 
-/// Signals of all runs, `(n_runs, n_samples, columns)` row-major; NaN after the sample at
+/// Signals of all runs, row-major `(n_runs, n_samples, columns)`. They are NaN after the sample at
 /// which a run stopped.
 #[derive(Debug, Clone, Default)]
 pub struct Traces {
-    /// Samples of each run.
+    /// Number of samples of each run.
     pub n_samples: usize,
     /// Commanded torques [Nm], per axis.
     pub command: Vec<f64>,
@@ -90,16 +91,16 @@ pub struct Traces {
     pub position_disturbance: Vec<f64>,
 }
 
-/// How a run ended and what it cost.
+/// Status and effort of a run.
 #[derive(Debug, Clone, Copy)]
 pub struct Outcome {
-    /// End of the run.
+    /// How the run ended.
     pub status: Status,
-    /// Cost; shared by the runs of a group, zero for the linear plant.
+    /// Effort, shared by the runs of a group; zero for the linear plant.
     pub effort: Effort,
 }
 
-/// Why a batch cannot run.
+/// Reason why a batch cannot run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BatchError {
     /// The plant cannot be built.
@@ -108,7 +109,7 @@ pub enum BatchError {
     /// The plant cannot be linearized.
     #[error(transparent)]
     Linear(#[from] LinearPlantError),
-    /// Misuse.
+    /// The input of the simulation is invalid.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
 }
@@ -116,7 +117,8 @@ pub enum BatchError {
 /// Simulate all runs, in the order of the inputs, on the threads of the current pool.
 ///
 /// # Errors
-/// [`BatchError`] for misuse; trouble of a run is its status.
+/// [`BatchError`] if the input is invalid or the plant cannot be built or linearized. A failure
+/// during a run is the status of that run.
 pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), BatchError> {
     let linear = match batch.model {
         Model::Linear => {
@@ -162,7 +164,7 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
         torque_disturbance: zeros(n_axes),
         position_disturbance: zeros(n_axes),
     };
-    // Chunks of no length are not allowed; there is nothing to cut then.
+    // Chunks of length zero panic; with no samples there is nothing to cut.
     let per_axis = (size * width).max(1);
     let per_joint = (n_samples * n_joints * width).max(1);
     let mut groups: Vec<Group<'_>> = Vec::new();
@@ -188,16 +190,17 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
     Ok((traces, outcomes.into_iter().flatten().collect()))
 }
 
-/// Runs in lock-step and where their signals go.
+/// Runs in lock-step, with the output arrays for their signals.
 struct Group<'a> {
     runs: Vec<usize>,
     n_samples: usize,
-    /// Command, measured, motor, joint, torque and position disturbance.
+    /// Command, measured and motor position, joint position, torque and position disturbance.
     signals: [&'a mut [f64]; 6],
 }
 
 impl Group<'_> {
-    /// All at once; if one of them fails, each alone, so that it spoils no other.
+    /// Simulate all runs at once. If one of them fails, simulate each alone, so that no run affects
+    /// another.
     fn simulate(
         &mut self,
         batch: &Batch<'_>,
@@ -240,14 +243,14 @@ impl Group<'_> {
         if let Status::Diverged(k) | Status::StepSizeCollapsed(k) | Status::Cancelled(k) =
             outcome.status
         {
-            // A cancelled run has not seen sample k, a failed one has.
+            // Sample k was observed in a failed run, but not in a cancelled one.
             let seen = k + usize::from(!matches!(outcome.status, Status::Cancelled(_)));
             self.blank(lane, seen);
         }
         Ok(outcome)
     }
 
-    /// NaN from sample `first` on.
+    /// Set the signals to NaN from sample `first` on.
     fn blank(&mut self, lane: usize, first: usize) {
         let count = self.runs.len() * self.n_samples;
         for signal in &mut self.signals {
@@ -297,7 +300,7 @@ impl Group<'_> {
         })
     }
 
-    /// Keep a sample of each lane.
+    /// Store a sample of each lane.
     #[inline(always)]
     fn take<S: Scalar>(
         &mut self,

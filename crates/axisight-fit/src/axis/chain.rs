@@ -1,15 +1,15 @@
 //! The equations of motion of a chain of masses over any scalar, thesis (9.4)-(9.9).
 //!
-//! The states are the deflections of the springs and the speeds of the masses, so that a
-//! turning axis has no state that drifts; the motor angle is carried where something needs it.
-//! Friction, backlash, springs and ripple are the formulas of the effects.
+//! The states are the deflections of the springs and the speeds of the masses, so that a turning
+//! axis has no drifting state. The motor angle is added if a term depends on it. Friction,
+//! backlash, springs and ripple use the formulas of the effects.
 
 use super::layout::AxisModel;
 use axisight_plant::formulas::{dead_zone, harmonic, smoothed_sign, spring_torque, stribeck_level};
 use axisight_scalar::Scalar;
 use std::array::from_fn;
 
-/// State of a chain of `N` masses, or its rate.
+/// State of a chain of `N` masses, or the rate of a state.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct State<S, const N: usize> {
     /// Motor angle, then the deflections of the springs.
@@ -19,7 +19,7 @@ pub(super) struct State<S, const N: usize> {
 }
 
 impl<S: Scalar, const N: usize> State<S, N> {
-    /// From motor angle, deflections and speeds, one after the other.
+    /// A state from motor angle, deflections and speeds, in this order.
     #[inline(always)]
     pub fn new(entry: impl Fn(usize) -> S) -> Self {
         Self {
@@ -28,7 +28,7 @@ impl<S: Scalar, const N: usize> State<S, N> {
         }
     }
 
-    /// `self + h * rate`; the motor angle of a chain that is not extended stays.
+    /// `self + h * rate`. The motor angle stays if the chain is not extended.
     #[inline(always)]
     pub fn moved<const EXTENDED: bool>(&self, rate: &Self, h: f64) -> Self {
         let mut out = *self;
@@ -41,7 +41,7 @@ impl<S: Scalar, const N: usize> State<S, N> {
         out
     }
 
-    /// Entry by its place as in [`State::new`].
+    /// Entry at a place, ordered as in [`State::new`].
     #[inline(always)]
     pub fn entry(&self, i: usize) -> S {
         if i < N {
@@ -51,7 +51,7 @@ impl<S: Scalar, const N: usize> State<S, N> {
         }
     }
 
-    /// `self + h * rate` where `h` carries derivatives.
+    /// `self + h * rate`, with derivatives of `h`.
     #[inline(always)]
     pub fn shifted(&self, rate: &Self, h: S) -> Self {
         Self {
@@ -70,23 +70,23 @@ impl<S: Scalar, const N: usize> State<S, N> {
     }
 }
 
-/// Which friction acts.
+/// The active friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Regime {
-    /// The motor turns in the direction of the sign.
+    /// The motor turns in the direction of this sign.
     Slip(f64),
     /// The motor stands.
     Stick,
-    /// The sign is smoothed; the direction takes care of itself.
+    /// The sign is smoothed, so that the direction needs no tracking.
     Smooth,
 }
 
-/// Parameters of a chain in the form the equations use. Springs count from 1: spring `i`
-/// pulls mass `i`.
+/// Parameters of a chain in the form of the equations. Springs count from 1: spring `i` pulls mass
+/// `i`.
 #[derive(Debug, Clone)]
 pub(super) struct Chain<S, const N: usize> {
     inverse_inertia: [S; N],
-    /// Motor acceleration by torque of the gear spring.
+    /// Motor acceleration per torque of the gear spring.
     gear_mobility: S,
     linear: [S; N],
     cubic: [S; N],
@@ -97,18 +97,18 @@ pub(super) struct Chain<S, const N: usize> {
     plain_ratio: f64,
     backlash: S,
     excess: S,
-    /// Whether there is an excess, or could be one.
+    /// Whether the excess is not zero or has derivatives.
     humped: bool,
     inverse_stribeck_speed: S,
     asymmetry: S,
     offset: S,
     ripple: Vec<(f64, S, S)>,
-    /// One over the smoothing; `None` for the sign itself.
+    /// One over the smoothing; `None` for an exact sign.
     pub inverse_smoothing: Option<f64>,
 }
 
 impl<S: Scalar, const N: usize> Chain<S, N> {
-    /// Chain with the parameters that `value` gives by their place.
+    /// A chain whose parameters are `value` of their places.
     #[inline(always)]
     pub fn new(model: &AxisModel, value: impl Fn(usize) -> S) -> Self {
         let layout = model.layout();
@@ -152,7 +152,7 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
         }
     }
 
-    /// `x` times the gear ratio, whose derivative only an extended chain carries, minus `y`.
+    /// `x` times the gear ratio, minus `y`. Only an extended chain has derivatives of the ratio.
     #[inline(always)]
     fn geared_less<const EXTENDED: bool>(&self, x: S, y: S) -> S {
         if EXTENDED {
@@ -165,7 +165,7 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
     /// Rates of the deflections and torques of the springs.
     #[inline(always)]
     fn springs<const EXTENDED: bool>(&self, x: &State<S, N>) -> ([S; N], [S; N]) {
-        // Loops, because the closures of `from_fn` are not always inlined.
+        // Loops, because closures of `from_fn` are not always inlined.
         let (mut rates, mut torques) = ([S::zero(); N], [S::zero(); N]);
         for i in 1..N {
             rates[i] = if i == 1 {
@@ -180,13 +180,13 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
                 (x.place[i], rates[i])
             };
             let spring = spring_torque(self.linear[i], self.cubic[i], deflection);
-            // The rate comes last: every operation after it delays the next stage.
+            // The rate comes last, because every operation after it delays the next stage.
             torques[i] = rate.fma(self.damping[i], spring);
         }
         (rates, torques)
     }
 
-    /// Torque on the motor but for gear and friction.
+    /// Torque on the motor, without gear and friction.
     #[inline(always)]
     fn drive<const EXTENDED: bool>(&self, x: &State<S, N>, torque: f64) -> S {
         let mut drive = S::constant(torque);
@@ -256,13 +256,13 @@ impl<S: Scalar, const N: usize> Chain<S, N> {
         rate
     }
 
-    /// Torque on a standing motor but for the friction.
+    /// Torque on a standing motor, without friction.
     pub fn standing_drive(&self, x: &State<S, N>, torque: f64) -> S {
         let (_, springs) = self.springs::<true>(x);
         self.drive::<true>(x, torque) - springs[1] * self.ratio
     }
 
-    /// Torque that the friction of a standing motor withstands.
+    /// Largest torque that the friction of a standing motor holds.
     pub fn breakaway(&self) -> S {
         self.coulomb + self.excess
     }
@@ -277,7 +277,7 @@ mod tests {
     const ORDER: f64 = 3.0;
     const SMOOTHING: f64 = 0.3;
 
-    /// A chain of two masses with nothing but what `set` gives.
+    /// A chain of two masses with only the parameters that `set` gives.
     fn chain(set: impl Fn(&mut Vec<f64>)) -> Chain<f64, 2> {
         let model = AxisModel {
             masses: 2,

@@ -1,26 +1,26 @@
-//! A record of one axis, and what it must be.
+//! A record of one axis, with its checks.
 
 use super::error::AxisError;
 
 /// A record of one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisSet {
-    /// Its number, from 0.
+    /// Number of the data set, from 0.
     pub number: usize,
     /// Motor torque [Nm].
     pub torque: Vec<f64>,
-    /// Measured output.
+    /// Measured output, one value per sample of the torque.
     pub output: Vec<f64>,
     /// Sample time [s].
     pub sample_time: f64,
-    /// Weight of its squared residuals.
+    /// Weight of the squared residuals.
     pub weight: f64,
-    /// Samples of a block of the sandwich covariance.
+    /// Samples per block of the sandwich covariance.
     pub block: usize,
 }
 
 impl AxisSet {
-    /// Refuse what no run can be made of, as number `i` of the data sets.
+    /// Refuse data that cannot be simulated; `i` is the number of the data set in the error.
     pub(super) fn check(&self, i: usize) -> Result<(), AxisError> {
         let field = |name: &str| format!("data_sets[{i}].{name}");
         let (n, m) = (self.torque.len(), self.output.len());

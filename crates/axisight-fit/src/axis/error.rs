@@ -1,16 +1,16 @@
-//! What can go wrong with an axis model.
+//! Errors of axis models.
 
-/// Why an axis cannot be simulated or fitted.
+/// Reason why an axis cannot be simulated or fitted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum AxisError {
-    /// Misuse.
+    /// An argument is invalid.
     #[error("{field}: expected {expected}, got {got}")]
     Invalid {
-        /// Argument.
+        /// Name of the argument.
         field: String,
-        /// What it should be.
+        /// Expected value.
         expected: String,
-        /// What came.
+        /// Actual value.
         got: String,
     },
     /// The simulated motion grew without bound.
@@ -21,14 +21,13 @@ pub enum AxisError {
         /// First sample without a finite speed.
         sample: usize,
     },
-    /// Another thread asked to stop.
+    /// Another thread cancelled the work.
     #[error("cancelled")]
     Cancelled,
 }
 
 impl AxisError {
-    /// Misuse of `field`.
-    // Callers hand over what they have just computed.
+    /// An [`AxisError::Invalid`] for `field`.
     #[allow(clippy::needless_pass_by_value)]
     pub(super) fn invalid(
         field: impl Into<String>,

@@ -1,19 +1,20 @@
-//! Residuals with their derivatives, sample by sample, and the normal equations they sum to.
+//! Residuals with their derivatives, sample by sample, and their normal equations.
 
 use super::numbers::LANES;
 use axisight_numerics::descent::Normal;
 
-/// Residuals of one data set and their derivatives.
+/// Residuals of one data set, with their derivatives.
 pub(super) struct Rows {
     /// Residual at each sample.
     pub residual: Vec<f64>,
-    /// Derivatives, eight parameters at a time: all samples of the first pass, then the next.
+    /// Derivatives in passes of eight parameters: all samples of the first pass, then of the next.
     pub partials: Vec<[f64; LANES]>,
     slots: Vec<usize>,
 }
 
 impl Rows {
-    /// No rows yet, for the free parameters number `slots`, in the memory of earlier ones.
+    /// Empty rows for the free parameters with the numbers `slots`. Reuses `memory` if there is
+    /// any.
     pub fn new(slots: Vec<usize>, samples: usize, memory: Option<Self>) -> Self {
         let (mut residual, mut partials) = memory.map_or_else(
             || {
@@ -39,7 +40,7 @@ impl Rows {
         self.partials.get(pass * n..(pass + 1) * n).unwrap_or(&[])
     }
 
-    /// Filter by `1 + a_1 q^-1 + ..`; the first samples, whose past is unknown, count nothing.
+    /// Filter by `1 + a_1 q^-1 + ..`. The first samples become zero, because their past is unknown.
     pub fn whiten(&mut self, coefficients: &[f64]) {
         if coefficients.is_empty() {
             return;
@@ -68,7 +69,7 @@ impl Rows {
         }
     }
 
-    /// Multiply by the root of a weight.
+    /// Multiply all rows by the square root of a weight.
     pub fn weigh(&mut self, root: f64) {
         self.residual.iter_mut().for_each(|r| *r *= root);
         self.partials
@@ -77,7 +78,7 @@ impl Rows {
             .for_each(|p| *p *= root);
     }
 
-    /// Derivatives with respect to free parameter number `slot`, zero if it does not act here.
+    /// Append the derivatives with respect to free parameter `slot`; zeros if it does not act here.
     pub fn append_column(&self, slot: usize, out: &mut Vec<f64>) {
         match self.slots.iter().position(|s| *s == slot) {
             Some(place) => {
@@ -88,7 +89,7 @@ impl Rows {
         }
     }
 
-    /// Gradients of blocks of about `block` samples over `n` free parameters, one after the other.
+    /// Gradients of blocks of about `block` samples over `n` free parameters, block by block.
     pub fn block_gradients(&self, block: usize, n: usize) -> Vec<f64> {
         let len = self.residual.len();
         let count = (len / block.max(1)).max(1);
@@ -106,7 +107,7 @@ impl Rows {
         out
     }
 
-    /// Normal equations of `n` free parameters.
+    /// Normal equations over `n` free parameters.
     pub fn normal(&self, n: usize) -> Normal {
         let mut out = Normal::zero(n);
         out.loss = self.residual.iter().map(|r| r * r).sum();
@@ -143,7 +144,7 @@ fn weighted_sum(part: &[[f64; LANES]], weight: &[f64]) -> [f64; LANES] {
 /// Sum of the outer products of rows.
 fn products(a: &[[f64; LANES]], b: &[[f64; LANES]]) -> [[f64; LANES]; LANES] {
     let mut sum = [[0.0; LANES]; LANES];
-    // Two halves, so that the sums stay in registers.
+    // Two halves keep the sums in registers.
     for half in 0..2 {
         let mut part = [[0.0; LANES]; LANES / 2];
         for (x, y) in a.iter().zip(b) {

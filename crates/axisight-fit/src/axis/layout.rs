@@ -1,11 +1,11 @@
-//! The structure of a model and the place of each of its parameters.
+//! Structure of an axis model, and the places of its parameters.
 
 use super::error::AxisError;
 
-/// Most masses of a chain.
+/// Largest number of masses of a chain.
 pub const MOST_MASSES: usize = 4;
 
-/// What is measured at the samples.
+/// The measured output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Output {
     /// Motor velocity.
@@ -16,42 +16,42 @@ pub enum Output {
     Position,
 }
 
-/// The motor torque between samples.
+/// The course of the motor torque between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hold {
-    /// Held.
+    /// Constant.
     Zero,
-    /// Straight from one sample to the next.
+    /// Linear from sample to sample.
     First,
 }
 
 /// Structure of the model of one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisModel {
-    /// Masses, the motor included.
+    /// Number of masses, including the motor.
     pub masses: usize,
-    /// What is measured.
+    /// Measured output.
     pub output: Output,
-    /// Torque between samples.
+    /// Course of the torque between samples.
     pub hold: Hold,
-    /// Half width of the smoothed sign of the Coulomb friction [rad/s]; zero for the sign itself.
+    /// Half width of the smoothed sign of the Coulomb friction [rad/s]; zero for an exact sign.
     pub smoothing: f64,
-    /// Orders of the torque ripple in the motor angle.
+    /// Orders of the torque ripple over the motor angle.
     pub ripple_orders: Vec<f64>,
     /// Runge-Kutta steps per sample.
     pub substeps: usize,
 }
 
-/// Where each parameter stands in the vector of all.
+/// Places of the parameters in the vector of all parameters.
 ///
-/// `J_1..J_n | k1_1.. | k3_1.. | d_1.. | F_v, F_c, r, b, F_s, v_s, F_a, offset |
-/// ripple (cos, sin).. | gains of the deflections, then of the speeds`, and for each data set
-/// its start `phi, deflections, speeds`.
+/// The order is `J_1..J_n | k1_1.. | k3_1.. | d_1.. | F_v, F_c, r, b, F_s, v_s, F_a, offset |
+/// ripple (cos, sin).. | gains of the deflections, then of the speeds`, and for each data set its
+/// start `phi, deflections, speeds`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// Masses.
+    /// Number of masses.
     pub masses: usize,
-    /// Orders of ripple.
+    /// Number of ripple orders.
     pub orders: usize,
 }
 
@@ -59,63 +59,63 @@ impl Layout {
     fn springs(self) -> usize {
         self.masses.saturating_sub(1)
     }
-    /// Inertia of mass `i`, the motor first.
+    /// Place of the inertia of mass `i`; the motor is the first.
     pub fn inertia(self, i: usize) -> usize {
         i
     }
-    /// Linear stiffness of spring `i`, the gear first.
+    /// Place of the linear stiffness of spring `i`; the gear is the first.
     pub fn linear(self, i: usize) -> usize {
         self.masses + i
     }
-    /// Cubic stiffness of spring `i`.
+    /// Place of the cubic stiffness of spring `i`.
     pub fn cubic(self, i: usize) -> usize {
         self.linear(0) + self.springs() + i
     }
-    /// Damping of spring `i`.
+    /// Place of the damping of spring `i`.
     pub fn damping(self, i: usize) -> usize {
         self.cubic(0) + self.springs() + i
     }
-    /// Viscous friction.
+    /// Place of the viscous friction.
     pub fn viscous(self) -> usize {
         self.damping(0) + self.springs()
     }
-    /// Coulomb friction.
+    /// Place of the Coulomb friction.
     pub fn coulomb(self) -> usize {
         self.viscous() + 1
     }
-    /// Gear ratio.
+    /// Place of the gear ratio.
     pub fn ratio(self) -> usize {
         self.viscous() + 2
     }
-    /// Half width of the backlash.
+    /// Place of the half width of the backlash.
     pub fn backlash(self) -> usize {
         self.viscous() + 3
     }
-    /// Excess of the friction at standstill over the Coulomb friction.
+    /// Place of the excess of friction at standstill over the Coulomb friction.
     pub fn excess(self) -> usize {
         self.viscous() + 4
     }
-    /// Speed at which the excess has fallen to 1/e.
+    /// Place of the speed at which the excess has fallen to 1/e.
     pub fn stribeck_speed(self) -> usize {
         self.viscous() + 5
     }
-    /// Viscous friction of the size of the speed.
+    /// Place of the viscous friction in proportion to the absolute speed.
     pub fn asymmetry(self) -> usize {
         self.viscous() + 6
     }
-    /// Constant motor torque.
+    /// Place of the constant motor torque.
     pub fn offset(self) -> usize {
         self.viscous() + 7
     }
-    /// Cosine amplitude of ripple order `i`; the sine follows.
+    /// Place of the cosine amplitude of ripple order `i`; the sine follows.
     pub fn ripple(self, i: usize) -> usize {
         self.viscous() + 8 + 2 * i
     }
-    /// Innovations gain of state `i`: deflections, then speeds.
+    /// Place of the innovations gain of state `i`: deflections, then speeds.
     pub fn gain(self, i: usize) -> usize {
         self.ripple(self.orders) + i
     }
-    /// Number of gains: states without the motor angle.
+    /// Number of gains, which is the number of states without the motor angle.
     pub fn gains(self) -> usize {
         2 * self.masses - 1
     }
@@ -123,11 +123,11 @@ impl Layout {
     pub fn shared(self) -> usize {
         self.gain(0) + self.gains()
     }
-    /// Entries of a start: motor angle, deflections, speeds.
+    /// Number of entries of a start: motor angle, deflections, speeds.
     pub fn states(self) -> usize {
         2 * self.masses
     }
-    /// First entry of the start of data set `set`.
+    /// Place of the first entry of the start of data set `set`.
     pub fn start(self, set: usize) -> usize {
         self.shared() + set * self.states()
     }
@@ -138,7 +138,7 @@ impl Layout {
 }
 
 impl AxisModel {
-    /// Place of each parameter.
+    /// Places of the parameters of this model.
     pub fn layout(&self) -> Layout {
         Layout {
             masses: self.masses,
@@ -146,10 +146,10 @@ impl AxisModel {
         }
     }
 
-    /// Refuse what no chain can be built from.
+    /// Check the structure of the model.
     ///
     /// # Errors
-    /// [`AxisError::Invalid`].
+    /// [`AxisError::Invalid`] that names the invalid field.
     pub fn check(&self) -> Result<(), AxisError> {
         if !(2..=MOST_MASSES).contains(&self.masses) {
             let wanted = format!("2 to {MOST_MASSES}");
@@ -171,8 +171,8 @@ impl AxisModel {
         }
     }
 
-    /// Whether the parameters `theta`, of which `free` may move, need more than two inertias,
-    /// springs, dampers, viscous and Coulomb friction.
+    /// Whether the parameters `theta`, of which `free` may move, need the extended equations. The
+    /// plain ones have inertias, springs, dampers, viscous and Coulomb friction only.
     pub(super) fn extended(&self, theta: &[f64], free: &[usize]) -> bool {
         let layout = self.layout();
         let special = [

@@ -1,14 +1,18 @@
 //! One axis as a chain of masses, fitted by its prediction error (thesis chapter 9).
 //!
-//! Bottom to top: [`Layout`] says where each parameter stands; `chain` holds the equations of
-//! motion over any scalar, `motion` steps them through a sample with the sign of the friction
-//! followed exactly; `predictor` runs a data set; [`AxisProblem`] turns data sets into
-//! residuals and normal equations, which [`search`] minimizes.
+//! From bottom to top:
 //!
-//! `Plant` could serve two masses with smoothed friction. It agrees to 3e-13, and takes 12 times as
-//! long a sample with seven derivatives, 4 times without (`benches/benches/axis_paths.rs`: 2054 and 640
-//! against 165 and 146 ns): it steps an arm of any joints, where a chain knows its few springs, and
-//! it does not follow the sign of dry friction. That is what the second path buys.
+//! * [`Layout`] gives the place of each parameter.
+//! * `chain` holds the equations of motion over any scalar.
+//! * `motion` integrates them over a sample, and follows the sign of the friction exactly.
+//! * `predictor` runs a data set.
+//! * [`AxisProblem`] turns data sets into residuals and normal equations.
+//! * [`search`] minimizes the loss.
+//!
+//! `Plant` could also simulate two masses with smoothed friction, with a difference of 3e-13. Per
+//! sample it takes 12 times as long with seven derivatives and 4 times as long without (2054 ns and
+//! 640 ns against 165 ns and 146 ns, `benches/benches/axis_paths.rs`), because it supports any
+//! number of joints. It also does not follow the sign of dry friction.
 
 mod chain;
 mod data;

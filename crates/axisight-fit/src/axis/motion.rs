@@ -1,34 +1,37 @@
-//! Through one sample by the classical Runge-Kutta method of order 4, with the sign of the
-//! friction followed exactly.
+//! Integration over one sample by the classical Runge-Kutta method of order 4, which follows the
+//! sign of the friction exactly.
 //!
-//! Where the sign is not smoothed the equations are smooth only between changes of regime:
-//! slipping ends where the speed crosses zero, sticking where the drive exceeds the friction.
-//! Such an instant is located inside the step and the step is done in two parts. Its
-//! derivative with respect to the parameters follows from the implicit function theorem:
-//! one Newton step on the guard in dual numbers from the root found in plain ones.
+//! Without smoothing of the sign, the equations are smooth only between changes of regime: slipping
+//! ends where the speed crosses zero, sticking ends where the drive exceeds the friction. The time
+//! of a change is located inside the step, and the step is taken in two parts. The derivative of
+//! this time with respect to the parameters follows from the implicit function theorem: one Newton
+//! step on the guard in dual numbers, from the root found in plain numbers.
 
 use super::chain::{Chain, Regime, State};
 use super::numbers::Number;
 use axisight_scalar::Scalar;
 
-/// Changes of regime within one step; beyond, the rest is done in the last regime.
+/// Largest number of regime changes within one step. After that, the rest of the step keeps the
+/// last regime.
 const MOST_CHANGES: usize = 8;
 
-/// A chain in three kinds of numbers: for the steps, for the steps in which the regime changes,
-/// and without derivatives for the search of the instants. Changes of regime are rare: they are
-/// compiled once for all chains of a length, with the extended equations.
+/// A chain in three kinds of numbers: for ordinary steps, for steps with a change of regime, and
+/// without derivatives for locating the change.
+///
+/// Changes of regime are rare, so they are compiled once for all chains of a length, with the
+/// extended equations.
 pub(super) struct Motion<S: Number, const N: usize> {
     chain: Chain<S, N>,
     changes: Changes<S::Plain, N>,
 }
 
-/// Steps in which the regime changes.
+/// Data for steps with a change of regime.
 struct Changes<S, const N: usize> {
     chain: Chain<S, N>,
     plain: Chain<f64, N>,
 }
 
-/// Torque at the start of a step and its slope.
+/// Torque at the start of a step, and its slope.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ramp {
     pub torque: f64,
@@ -47,8 +50,11 @@ impl Ramp {
     }
 }
 
-/// Written out for the commonest chain and for plain numbers: 10 % and 25 % faster than the loop.
-/// Of the others the loop is as fast, and takes the compiler a third of the time.
+/// One Runge-Kutta step.
+///
+/// The step is written out for the most common chain and for plain numbers, where this is 10 % and
+/// 25 % faster than the loop. For all others the loop is as fast, and compiles in a third of the
+/// time.
 #[inline(always)]
 fn runge_kutta4<S: Scalar, const N: usize, const EXTENDED: bool>(
     chain: &Chain<S, N>,
@@ -69,7 +75,7 @@ fn runge_kutta4<S: Scalar, const N: usize, const EXTENDED: bool>(
             .moved::<EXTENDED>(&c, h / 3.0)
             .moved::<EXTENDED>(&d, h / 6.0);
     }
-    // By how far a stage looks ahead along the last rate, its torque, its weight in the step.
+    // Each stage: step along the last rate, torque, weight in the sum.
     let stages = [
         (0.0, ramp.torque, h / 6.0),
         (half, middle, h / 3.0),
@@ -85,7 +91,7 @@ fn runge_kutta4<S: Scalar, const N: usize, const EXTENDED: bool>(
     next
 }
 
-/// Positive while `regime` lasts.
+/// A function that is positive while `regime` lasts.
 #[inline(always)]
 fn guard<S: Scalar, const N: usize>(
     chain: &Chain<S, N>,
@@ -112,7 +118,7 @@ impl<S: Number, const N: usize> Motion<S, N> {
         }
     }
 
-    /// The state a time `h` later.
+    /// The state after the time `h`.
     #[inline(always)]
     pub fn step<const EXTENDED: bool>(&self, x: &State<S, N>, ramp: Ramp, h: f64) -> State<S, N> {
         let speed = x.speed[0].lane(0);
@@ -142,12 +148,13 @@ impl<S: Number, const N: usize> Motion<S, N> {
 }
 
 impl<S: Scalar, const N: usize> Changes<S, N> {
-    /// A step in which the regime changes.
+    /// The state after the time `h`, for a step with a change of regime.
     #[inline(never)]
     fn step(&self, x: &State<S, N>, ramp: Ramp, h: f64, regime: Regime) -> State<S, N> {
         let (mut x, mut ramp, mut left, mut regime) = (*x, ramp, h, regime);
-        // The instants carry derivatives, the lengths of the parts do not: `late` is by how
-        // much the state stands behind its nominal time, zero but for its derivatives.
+        // The times of changes have derivatives, but the lengths of the parts do not. `late` is the
+        // lag of the state behind its nominal time; its value is zero, and only its derivatives are
+        // not.
         let mut late = S::zero();
         for _ in 0..MOST_CHANGES {
             let next = self.advance(&x, ramp, left, regime);
@@ -181,7 +188,7 @@ impl<S: Scalar, const N: usize> Changes<S, N> {
         runge_kutta4::<S, N, true>(&self.chain, x, ramp, h, regime)
     }
 
-    /// The state a short time later, which carries derivatives.
+    /// The state after a short time, which has derivatives.
     #[inline(never)]
     fn shifted(&self, x: &State<S, N>, torque: f64, regime: Regime, time: S) -> State<S, N> {
         x.shifted(&self.chain.rate::<true>(x, torque, regime), time)
@@ -202,8 +209,8 @@ impl<const N: usize> Chain<f64, N> {
         guard(self, x, torque, regime) >= 0.0
     }
 
-    /// When the guard of `regime` falls through zero within `h`, and its slope there; slope
-    /// zero where it does so at once.
+    /// The time within `h` at which the guard of `regime` falls through zero, and the slope of the
+    /// guard there. The slope is zero if the guard falls at once.
     fn instant(&self, x: &State<f64, N>, ramp: Ramp, h: f64, regime: Regime) -> (f64, f64) {
         let value = |t: f64| {
             let x = self.advanced(x, ramp, t, regime);
@@ -214,7 +221,7 @@ impl<const N: usize> Chain<f64, N> {
         if above <= 0.0 {
             return (0.0, 0.0);
         }
-        // Regula falsi; an end that stays twice counts half (Illinois).
+        // Regula falsi with the Illinois rule: an end that stays twice counts half.
         let (mut t, mut side) = (high, 0);
         for _ in 0..60 {
             t = (low * below - high * above) / (below - above);

@@ -1,9 +1,8 @@
-//! The numbers that a chain is run with: plain ones, and ones that carry eight derivatives in
-//! vector registers.
+//! Number types for chains: plain numbers, and numbers with eight derivatives in vector registers.
 
 use axisight_scalar::{DualNumber, Lanes, Register, Scalar};
 
-/// Parameters differentiated in one pass.
+/// Number of parameters that one pass differentiates.
 pub(super) const LANES: usize = 8;
 
 /// A value and its derivatives along eight seeds, in registers `V`.
@@ -12,14 +11,14 @@ pub(super) type Jet<V> = DualNumber<f64, V>;
 /// Derivatives in registers that every processor has.
 pub(super) type PlainLanes = Lanes<LANES>;
 
-/// A scalar with a twin that every processor can compute with: rare steps are compiled for the
-/// twin alone.
+/// A scalar with a counterpart that every processor supports. Rare steps are compiled for the
+/// counterpart only.
 pub(super) trait Number: Scalar {
-    /// The twin.
+    /// The counterpart.
     type Plain: Scalar;
-    /// As the twin.
+    /// Convert to the counterpart.
     fn plain(self) -> Self::Plain;
-    /// Back again.
+    /// Convert from the counterpart.
     fn from_plain(x: Self::Plain) -> Self;
 }
 

@@ -1,4 +1,4 @@
-//! Runs of one data set: simulation, and prediction with the innovations form (3.33).
+//! Runs of one data set: simulation, or prediction with the innovations form (3.33).
 
 use super::chain::{Chain, State};
 use super::data::AxisSet;
@@ -8,22 +8,22 @@ use super::motion::{Motion, Ramp};
 use super::numbers::Number;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Motor speed [rad/s] beyond which a run counts as diverged.
+/// Motor speed [rad/s] above which a run has diverged.
 const LARGEST_SPEED: f64 = 1e6;
 
-/// Samples between two looks at the cancel flag.
+/// Number of samples between two checks of the cancel flag.
 const LOOK: usize = 4096;
 
-/// A simulated run, samples by row.
+/// A simulated or predicted run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
-    /// Output of the model.
+    /// Output of the model, one value per sample.
     pub output: Vec<f64>,
-    /// Motor angle, deflections, speeds at each sample, one row after the other.
+    /// Motor angle, deflections and speeds, row-major `(sample, state)`.
     pub states: Vec<f64>,
 }
 
-/// A run in progress.
+/// A run of one data set.
 pub(super) struct Predictor<'a, S: Number, const N: usize> {
     model: &'a AxisModel,
     motion: Motion<S, N>,
@@ -32,7 +32,7 @@ pub(super) struct Predictor<'a, S: Number, const N: usize> {
 }
 
 impl<'a, S: Number, const N: usize> Predictor<'a, S, N> {
-    /// From all parameters by their place; the start is that of data set `set`.
+    /// A run of data set `set`; `value` gives each parameter by its place.
     #[inline(always)]
     pub fn new(
         model: &'a AxisModel,
@@ -62,8 +62,8 @@ impl<'a, S: Number, const N: usize> Predictor<'a, S, N> {
         }
     }
 
-    /// Run through the samples, handing over the predicted output at each; `visit` gets the
-    /// sample, the state and the output.
+    /// Run through the samples. `visit` receives the sample number, the state and the predicted
+    /// output.
     #[inline(always)]
     pub fn run<const EXTENDED: bool>(
         &self,

@@ -1,4 +1,4 @@
-//! Data sets and parameters as residuals, their derivatives and normal equations.
+//! Residuals, derivatives and normal equations for data sets and parameters.
 
 use super::data::AxisSet;
 use super::error::AxisError;
@@ -13,37 +13,37 @@ use axisight_scalar::{Register, Scalar};
 use rayon::prelude::*;
 use std::sync::atomic::AtomicBool;
 
-/// Residuals with derivatives by data set, and the normal equations they sum to.
+/// Residuals with derivatives of each data set, and their normal equations.
 pub(super) struct Evaluation {
     pub normal: Normal,
     pub rows: Vec<Rows>,
 }
 
-/// Residuals and Jacobian, set after set.
+/// Residuals and Jacobian, data set by data set.
 #[derive(Debug, Clone)]
 pub struct Linearization {
-    /// Weighted (and, with a noise filter, whitened) residuals, model minus measurement.
+    /// Weighted residuals, model minus measurement. A noise filter also whitens them.
     pub residual: Vec<f64>,
-    /// Derivatives of the residuals, one vector for each free parameter.
+    /// Derivatives of the residuals, one vector per free parameter.
     pub columns: Vec<Vec<f64>>,
 }
 
-/// Data sets to be explained by one model.
+/// Data sets that one model has to explain.
 #[derive(Debug)]
 pub struct AxisProblem<'a> {
     model: AxisModel,
     sets: Vec<AxisSet>,
-    /// Coefficients `a_1..` of `A(q)`, by which residuals are whitened: `H = 1 / A`.
+    /// Coefficients `a_1..` of `A(q)` that whiten the residuals: `H = 1 / A`.
     whitening: Vec<f64>,
     predicts: bool,
     cancel: &'a AtomicBool,
 }
 
 impl<'a> AxisProblem<'a> {
-    /// A problem; `predicts` switches the innovations gains on.
+    /// A problem for `model` and `sets`; `predicts` switches the innovations gains on.
     ///
     /// # Errors
-    /// [`AxisError::Invalid`] for a model or data that make no sense.
+    /// [`AxisError::Invalid`] if the model, a data set or the whitening filter is invalid.
     pub fn new(
         model: AxisModel,
         sets: Vec<AxisSet>,
@@ -67,7 +67,7 @@ impl<'a> AxisProblem<'a> {
         })
     }
 
-    /// Place of each parameter.
+    /// Places of the parameters.
     pub fn layout(&self) -> Layout {
         self.model.layout()
     }
@@ -77,19 +77,19 @@ impl<'a> AxisProblem<'a> {
         &self.sets
     }
 
-    /// Number of parameters, starts of the data sets included.
+    /// Number of parameters, including the starts of the data sets.
     pub fn n_parameters(&self) -> usize {
         self.layout().len(self.sets.len())
     }
 
-    /// Weighted sum of the squared outputs: what "small" means for the loss.
+    /// Weighted sum of the squared outputs, as a scale for the loss.
     pub fn energy(&self) -> f64 {
         let of = |s: &AxisSet| s.weight * s.output.iter().map(|y| y * y).sum::<f64>();
         self.sets.iter().map(of).sum()
     }
 
-    /// Residuals and normal equations of the `free` parameters at `theta`; the memory of
-    /// `spare` is used again.
+    /// Residuals and normal equations of the `free` parameters at `theta`. Reuses the memory of
+    /// `spare`.
     pub(super) fn evaluate(
         &self,
         theta: &[f64],
@@ -122,7 +122,8 @@ impl<'a> AxisProblem<'a> {
     /// Residuals and Jacobian at `theta`.
     ///
     /// # Errors
-    /// [`AxisError::Diverged`] where the simulation fails, [`AxisError::Cancelled`].
+    /// [`AxisError::Diverged`] if the simulation fails, [`AxisError::Cancelled`], and
+    /// [`AxisError::Invalid`] if `theta` has the wrong length.
     pub fn linearize(&self, theta: &[f64], free: &[usize]) -> Result<Linearization, AxisError> {
         let parts: Vec<_> = (0..self.sets.len())
             .into_par_iter()
@@ -142,10 +143,11 @@ impl<'a> AxisProblem<'a> {
         Ok(out)
     }
 
-    /// Simulated or predicted run of data set `set`.
+    /// Simulated or predicted run of data set `set` at the parameters `theta`.
     ///
     /// # Errors
-    /// [`AxisError::Diverged`] where the simulation fails, [`AxisError::Cancelled`].
+    /// [`AxisError::Diverged`] if the simulation fails, [`AxisError::Cancelled`], and
+    /// [`AxisError::Invalid`] if `theta` has the wrong length or there is no such data set.
     pub fn trajectory(&self, theta: &[f64], set: usize) -> Result<Trajectory, AxisError> {
         self.complete(theta)?;
         match self.model.masses {
@@ -178,7 +180,7 @@ impl<'a> AxisProblem<'a> {
         };
         let value = |i: usize| theta.get(i).copied().unwrap_or(0.0);
         let run = Predictor::<f64, N>::new(&self.model, theta, set, value, self.predicts);
-        // The motor angle belongs to the trajectory: the extended equations carry it.
+        // Trajectories include the motor angle, which only the extended equations integrate.
         run.run::<true>(data, self.cancel, |_, x, y| {
             out.output.push(y);
             out.states.extend(x.place.iter().chain(&x.speed));
@@ -186,7 +188,7 @@ impl<'a> AxisProblem<'a> {
         Ok(out)
     }
 
-    /// Residuals of a data set and their derivatives, eight parameters to a pass.
+    /// Residuals of a data set with their derivatives, in passes of eight parameters.
     fn rows(
         &self,
         theta: &[f64],
@@ -236,7 +238,7 @@ impl<'a> AxisProblem<'a> {
         Ok(rows)
     }
 
-    /// One pass, in the widest registers there are.
+    /// One pass, in the widest registers that the processor has.
     fn pass<const N: usize, const EXTENDED: bool>(
         &self,
         task: &Pass<'_>,
@@ -244,7 +246,7 @@ impl<'a> AxisProblem<'a> {
     ) -> Result<(), AxisError> {
         #[cfg(target_arch = "x86_64")]
         if wide::available() && !EXTENDED {
-            // SAFETY: the processor has the instructions.
+            // SAFETY: `available` has checked that the processor has the instructions.
             #[allow(unsafe_code)]
             match N {
                 2 => return unsafe { self.wide_pass_of_two(task, rows) },
@@ -255,7 +257,7 @@ impl<'a> AxisProblem<'a> {
         self.pass_of::<PlainLanes, N, EXTENDED>(task, rows)
     }
 
-    // By name for the common chains: compiled for all of them, the package takes minutes longer.
+    // Separate functions for the common chains only. Compiling them for all chains takes minutes.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512dq")]
     fn wide_pass_of_two(&self, task: &Pass<'_>, rows: &mut Rows) -> Result<(), AxisError> {
@@ -293,11 +295,11 @@ impl<'a> AxisProblem<'a> {
     }
 }
 
-/// Up to eight parameters to be differentiated in one run of one data set.
+/// A run of one data set with derivatives along up to eight parameters.
 struct Pass<'a> {
     theta: &'a [f64],
     seeds: &'a [usize],
     set: usize,
-    /// The run also gives the residuals.
+    /// Whether the run also gives the residuals.
     first: bool,
 }

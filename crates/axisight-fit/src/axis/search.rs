@@ -1,8 +1,8 @@
 //! The search for the parameters of an axis.
 //!
-//! Every trial point comes with its derivatives: they cost less than a second run. The fit to
-//! logs keeps residuals and Jacobian in memory and runs the model twice per step; here that
-//! would take half of the time.
+//! Every trial point is evaluated with its derivatives, which cost less than a second run. The fit
+//! to logs instead keeps residuals and Jacobian in memory and runs the model twice per step; here
+//! that would take half of the total time.
 
 use super::AxisError;
 use super::problem::{AxisProblem, Evaluation};
@@ -13,62 +13,62 @@ use axisight_numerics::descent::{
 /// One parameter of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchParameter {
-    /// Where the search starts.
+    /// Start value.
     pub initial: f64,
     /// Lower bound.
     pub lower: f64,
     /// Upper bound.
     pub upper: f64,
-    /// What a small change is compared with where the parameter itself is near zero.
+    /// Scale of small changes, for values of the parameter near zero.
     pub scale: f64,
-    /// May move.
+    /// Whether the parameter may move.
     pub free: bool,
 }
 
 /// Settings of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchOptions {
-    /// Most accepted steps.
+    /// Largest number of accepted steps.
     pub max_iterations: usize,
-    /// Stop when the linear model promises to lower the loss by less than this share.
+    /// Stop if the linear model predicts a reduction of the loss below this share.
     pub loss_tolerance: f64,
-    /// Stop when no parameter moves by more than this share of itself.
+    /// Stop if no parameter moves by more than this share of itself.
     pub step_tolerance: f64,
 }
 
-/// Where a search ended.
+/// Result of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchResult {
-    /// How.
+    /// Why the search ended.
     pub status: Status,
-    /// All parameters.
+    /// All parameters at the end.
     pub theta: Vec<f64>,
     /// Weighted sum of squared residuals.
     pub loss: f64,
-    /// The same at the start.
+    /// Weighted sum of squared residuals at the start.
     pub initial_loss: f64,
-    /// Accepted steps.
+    /// Number of accepted steps.
     pub iterations: usize,
-    /// Runs through the data.
+    /// Number of evaluations.
     pub evaluations: usize,
     /// Normal equations at the end, over the free parameters.
     pub normal: Normal,
-    /// Weighted, whitened residuals, model minus measurement, set after set.
+    /// Weighted and whitened residuals, model minus measurement, data set by data set.
     pub residual: Vec<f64>,
-    /// `J^T r` of every block of every set over the free parameters.
+    /// `J^T r` of every block of every data set, over the free parameters.
     pub block_gradients: Vec<f64>,
 }
 
-/// Largest factor by which one step changes a parameter that cannot change its sign: far from
-/// the minimum it may promise nonsense, half of the inertias of none.
+/// Largest factor by which one step changes a parameter of fixed sign. Far from the minimum the
+/// linear model fails: an unlimited step may set half of the inertias to zero.
 const LARGEST_FACTOR: f64 = 5.0;
 
-/// Promise, in variances of one residual, below which a search has settled: all parameters
-/// together are then within 0.7 standard deviations of the minimum. Instants at which the friction
-/// changes put kinks of that size into a noisy loss.
+/// Predicted reduction, in variances of one residual, below which a search has converged. All
+/// parameters together are then within 0.7 standard deviations of the minimum. Changes of the
+/// friction's sign put kinks of this size into a noisy loss.
 const SETTLED: f64 = 0.5;
 
-/// Share of the energy of the data below which residuals are rounding errors.
+/// Residuals below this share of the energy of the data are rounding errors.
 const ROUNDING: f64 = 1e-24;
 
 struct Search<'a> {
@@ -78,15 +78,15 @@ struct Search<'a> {
     free: Vec<usize>,
     evaluations: usize,
     point: Evaluation,
-    /// Memory of a point that was left.
+    /// Memory of a discarded point, for reuse.
     spare: Option<Evaluation>,
 }
 
 /// Minimize the loss of `problem` from the initial parameters.
 ///
 /// # Errors
-/// [`AxisError::Invalid`] for misuse, [`AxisError::Diverged`] where the start cannot be
-/// simulated, [`AxisError::Cancelled`].
+/// [`AxisError::Invalid`] if `parameters` do not fit the problem, [`AxisError::Diverged`] if the
+/// start cannot be simulated, and [`AxisError::Cancelled`].
 pub fn search(
     problem: &AxisProblem<'_>,
     parameters: &[SearchParameter],
@@ -173,7 +173,7 @@ impl Search<'_> {
         }
     }
 
-    /// Put the free parameters in their places.
+    /// Copy the free parameters to their places.
     fn place(&mut self, free: &[f64]) {
         for (i, x) in self.free.iter().zip(free) {
             self.theta[*i] = *x;

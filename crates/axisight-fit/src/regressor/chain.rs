@@ -1,12 +1,14 @@
-//! One sweep over the chain: what each link's parameters do to each joint.
+//! One sweep over the chain: the effect of each link's parameters on each joint.
 //!
-//! All in the frame of the link at hand. With the angular velocity w, angular acceleration e
-//! and acceleration a (gravity taken off) of the link's frame, link parameters m, h, I make
-//! the force `m a + (e x + w x w x) h` and, about the frame's origin, the moment
-//! `I e + w x I w + h x a`. A joint with unit motion (s, t) at that frame takes
-//! `t . force + s . moment`: ten numbers for every joint that carries the link, about 65
-//! multiply-adds each, so that one sample costs what its columns are many, not a multiple
-//! of inverse dynamics.
+//! All quantities are in the frame of the present link. Let w, e and a be the angular velocity, the
+//! angular acceleration and the acceleration (minus gravity) of this frame. The link parameters m,
+//! h, I give the force `m a + (e x + w x w x) h` and, about the origin of the frame, the moment
+//! `I e + w x I w + h x a`. A joint with the unit motion (s, t) at this frame feels
+//! `t . force + s . moment`.
+//!
+//! These are ten numbers for every joint that carries the link, at about 65 multiply-adds per
+//! joint. The cost of a sample is proportional to its number of columns, not to a multiple of
+//! inverse dynamics.
 
 use axisight_plant::robot::{Joint, Mat3, Motion, RobotDescription, Vec3};
 use axisight_scalar::Scalar;
@@ -32,7 +34,7 @@ impl From<&Joint> for Segment {
     }
 }
 
-/// The chain as the sweep needs it.
+/// The chain, prepared for the sweep.
 #[derive(Debug, Clone)]
 pub(super) struct Geometry {
     pub(super) gravity: [f64; 3],
@@ -52,7 +54,7 @@ impl Geometry {
     }
 }
 
-/// Turns a vector from the parent's axes into the link's.
+/// The rotation of a vector from the parent's axes to the link's axes.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Turn<S> {
     None,
@@ -110,18 +112,18 @@ pub(super) struct JointMotion<S> {
     pub(super) a: S,
 }
 
-/// Unit motion of a joint at the frame of a link: turn and shift.
+/// Unit motion of a joint at the frame of a link: rotation and translation.
 #[derive(Debug, Clone, Copy)]
 struct Unit<S> {
     turn: Vec3<S>,
     shift: Vec3<S>,
 }
 
-/// Scratch of a sweep.
+/// Scratch memory of a sweep.
 #[derive(Debug, Clone)]
 pub(super) struct Sweep<S> {
     units: Vec<Unit<S>>,
-    /// Entry `[(link * n_joints + joint) * 10 + parameter]`; joints beyond a link stay zero.
+    /// Entry `[(link * n_joints + joint) * 10 + parameter]`. Joints beyond a link stay zero.
     pub(super) cells: Vec<S>,
 }
 
@@ -180,7 +182,7 @@ impl<S: Scalar> Sweep<S> {
 }
 
 impl Segment {
-    /// Place of the link's origin in the parent's axes.
+    /// Position of the link's origin in the parent's axes.
     #[inline(always)]
     pub(super) fn offset<S: Scalar>(&self, q: S) -> Vec3<S> {
         let origin = Vec3::constant(self.origin);
@@ -195,7 +197,7 @@ impl Segment {
         Turn::new(self, q)
     }
 
-    /// Unit turn and unit shift of the joint.
+    /// Unit rotation and unit translation of the joint.
     #[inline(always)]
     pub(super) fn unit<S: Scalar>(&self) -> (Vec3<S>, Vec3<S>) {
         let along = Vec3::constant(self.axis);
@@ -206,12 +208,12 @@ impl Segment {
     }
 }
 
-/// How the frame of a link moves, in its own axes.
+/// Motion of a link's frame, in its own axes.
 #[derive(Debug, Clone, Copy)]
 struct Frame<S> {
     rate: Vec3<S>,
     growth: Vec3<S>,
-    /// Of the origin, gravity taken off.
+    /// Acceleration of the origin, minus gravity.
     acceleration: Vec3<S>,
 }
 

@@ -10,11 +10,13 @@ use rayon::prelude::*;
 const TASK: usize = 256;
 
 impl Regressor {
-    /// Kinetic plus potential energy of the links per unit of each link parameter,
-    /// `(n_samples, 10 n_links)`, row-major; `q`, `v` are `(n_samples, n_joints)`.
+    /// Kinetic plus potential energy of the links per unit of each link parameter, row-major
+    /// `(n_samples, 10 n_links)`.
+    ///
+    /// `q` and `v` have the shape `(n_samples, n_joints)`.
     ///
     /// # Errors
-    /// [`RegressorError`] for arrays of unequal or wrong size, or not finite.
+    /// [`RegressorError`] if an array has the wrong size or is not finite.
     pub fn energy(&self, q: &[f64], v: &[f64]) -> Result<Vec<f64>, RegressorError> {
         let n = self.n_joints();
         let n_samples = q.len() / n;
@@ -50,7 +52,7 @@ impl Regressor {
             |x: &[f64], j: usize| Lane::from_lanes(|lane| x[(first + lane).min(last) * n + j]);
         let mut rate = Vec3::<Lane>::zero();
         let mut speed = Vec3::zero();
-        // Gravity in link axes, and its work from the base to the link's origin.
+        // Gravity in link axes, and its work between the base and the link's origin.
         let mut gravity = Vec3::constant(self.geometry.gravity);
         let mut fall = Lane::zero();
         let mut blocks = out.chunks_exact_mut(LINK_PARAMETERS);

@@ -1,4 +1,4 @@
-//! The regressor, sample by sample in lanes, blocks of samples in parallel.
+//! Evaluation of the regressor: samples in lanes, blocks of samples in parallel.
 
 use super::chain::{Geometry, JointMotion, LINK_PARAMETERS, Sweep};
 use super::extra::Extra;
@@ -7,11 +7,11 @@ use axisight_plant::robot::RobotDescription;
 use axisight_scalar::{Lanes, Scalar};
 use rayon::prelude::*;
 
-/// Samples in lock-step.
+/// Number of samples in lock-step.
 pub(super) const LANES: usize = 8;
 pub(super) type Lane = Lanes<LANES>;
 
-/// Samples per parallel task.
+/// Number of samples of a parallel task.
 const TASK: usize = 128;
 
 /// Motions of all joints, row-major `(n_samples, n_joints)` [rad, rad/s, rad/s^2; m].
@@ -25,11 +25,11 @@ pub struct Motion<'a> {
     pub a: &'a [f64],
 }
 
-/// One nonzero entry of a row: where it is taken from.
+/// One nonzero entry of a row, with its source.
 #[derive(Debug, Clone)]
 pub(super) struct Entry {
     pub(super) column: usize,
-    /// Cells of the sweep with coefficients; empty for an extra column.
+    /// Cells of the sweep, with coefficients; empty for an extra column.
     cells: Vec<(usize, f64)>,
     extra: Option<(usize, f64)>,
 }
@@ -39,11 +39,11 @@ pub(super) struct Entry {
 pub struct Regressor {
     pub(super) geometry: Geometry,
     extras: Vec<Extra>,
-    /// For each row its columns that are not zero for structural reasons.
+    /// The structurally nonzero columns of each row.
     pub(super) rows: Vec<Vec<Entry>>,
 }
 
-/// Scratch of one task.
+/// Scratch memory of one task.
 pub(super) struct Scratch {
     sweep: Sweep<Lane>,
     motion: Vec<JointMotion<Lane>>,
@@ -51,11 +51,12 @@ pub(super) struct Scratch {
 }
 
 impl Regressor {
-    /// Rows `row_map (n_rows, n_joints) * joint torques` of `robot`, with `extras` columns
-    /// after those of the links.
+    /// The regressor for the rows `row_map (n_rows, n_joints) * joint torques` of `robot`. The
+    /// columns `extras` follow those of the links.
     ///
     /// # Errors
-    /// [`RegressorError`] for a row map or an extra of the wrong size or not finite.
+    /// [`RegressorError`] if there is no row, or if the row map or an extra column has the wrong
+    /// size or is not finite.
     pub fn new(
         robot: &RobotDescription,
         row_map: &[f64],
@@ -100,7 +101,7 @@ impl Regressor {
         &self.geometry.links
     }
 
-    /// Check a motion; its number of samples.
+    /// Check a motion; returns its number of samples.
     pub(super) fn check(&self, motion: &Motion<'_>) -> Result<usize, RegressorError> {
         let n = self.n_joints();
         let n_samples = motion.q.len() / n;
@@ -118,7 +119,7 @@ impl Regressor {
         }
     }
 
-    /// Evaluate the samples from `first` on, one per lane; the last sample fills up.
+    /// Evaluate the samples from `first` on, one per lane. The last sample fills unused lanes.
     #[inline]
     pub(super) fn sweep(&self, scratch: &mut Scratch, motion: &Motion<'_>, first: usize) {
         let n = self.n_joints();
@@ -147,7 +148,7 @@ impl Regressor {
         }
     }
 
-    /// Entries of all rows that lie side by side.
+    /// The entries of all rows, as runs of adjacent entries.
     fn runs(&self) -> Vec<Run> {
         let n_parameters = self.n_parameters();
         let places = self
@@ -169,10 +170,10 @@ impl Regressor {
         out
     }
 
-    /// The regressor `(n_samples, n_rows, n_parameters)`, row-major.
+    /// The regressor, row-major `(n_samples, n_rows, n_parameters)`.
     ///
     /// # Errors
-    /// [`RegressorError`] for arrays of unequal or wrong size, or not finite.
+    /// [`RegressorError`] if an array has the wrong size or is not finite.
     pub fn evaluate(&self, motion: &Motion<'_>) -> Result<Vec<f64>, RegressorError> {
         let n_samples = self.check(motion)?;
         let n_parameters = self.n_parameters();
@@ -218,14 +219,14 @@ impl Entry {
     }
 }
 
-/// Entries side by side: where they go in a sample, the first of them, how many.
+/// A run of adjacent entries: its place in a sample, its first entry, its length.
 struct Run {
     place: usize,
     first: usize,
     len: usize,
 }
 
-/// One lane of the values to its sample.
+/// Copy one lane of the values to its sample.
 #[inline(always)]
 fn copy_lane(runs: &[Run], values: &[Lane], lane: usize, sample: &mut [f64]) {
     for run in runs {
@@ -236,7 +237,7 @@ fn copy_lane(runs: &[Run], values: &[Lane], lane: usize, sample: &mut [f64]) {
     }
 }
 
-/// Columns of row `r` that are not zero for structural reasons.
+/// The structurally nonzero columns of row `r`.
 fn entries(geometry: &Geometry, r: usize, weights: &[f64], extras: &[Extra]) -> Vec<Entry> {
     let n = weights.len();
     let mut out = Vec::new();

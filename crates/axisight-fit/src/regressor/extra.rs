@@ -1,26 +1,26 @@
-//! Columns beside the links': rotors, friction, springs.
+//! Columns besides those of the links: rotors, friction, springs.
 
 use super::RegressorError;
 use axisight_scalar::Scalar;
 
-/// What a column follows.
+/// The signal of an extra column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Signal {
-    /// The position: a spring.
+    /// Position, for a spring.
     Position,
-    /// The velocity: viscous friction.
+    /// Velocity, for viscous friction.
     Velocity,
-    /// The acceleration: a rotor.
+    /// Acceleration, for a rotor.
     Acceleration,
-    /// The direction of motion: Coulomb friction. Zero within `dead_band` of standstill;
-    /// `tanh(v / smoothing)` where smoothing is not zero.
+    /// Direction of motion, for Coulomb friction. It is zero within `dead_band` of standstill, and
+    /// `tanh(v / smoothing)` if the smoothing is not zero.
     Direction {
         /// Speed below which the direction counts as unknown.
         dead_band: f64,
-        /// Speed over which the direction changes; zero is a step.
+        /// Speed over which the direction changes; zero for a step.
         smoothing: f64,
     },
-    /// One: an offset.
+    /// One, for an offset.
     Constant,
 }
 
@@ -47,14 +47,14 @@ impl Signal {
     }
 }
 
-/// A column: a signal of a combination of joints, felt in fixed proportions by the rows.
+/// An extra column: a signal of a combination of joints, with a fixed factor in each row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extra {
-    /// What it follows.
+    /// The signal.
     pub signal: Signal,
-    /// Coefficient of each joint in the motion it follows.
+    /// Coefficient of each joint in the motion of the signal.
     pub motion: Vec<f64>,
-    /// What a unit of the signal is in each row.
+    /// Factor of the signal in each row.
     pub rows: Vec<f64>,
 }
 

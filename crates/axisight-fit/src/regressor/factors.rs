@@ -1,9 +1,9 @@
 //! Triangular factors of `[Phi | tau]`, row by row and block by block of samples.
 //!
-//! The rows of different axes keep factors of their own: an axis feels only the links beyond
-//! it, which halves the work, and weights of axes can change afterwards without a second
-//! look at the data. So do blocks of samples, whose scatter gives the covariance when
-//! residuals are coloured.
+//! The rows of different axes have separate factors. An axis feels only the links beyond it, so
+//! this halves the work, and the weights of axes can change without another pass over the data.
+//! Blocks of samples also have separate factors; their scatter gives the covariance if residuals
+//! are coloured.
 
 use super::evaluate::{LANES, Motion, Regressor};
 use super::householder::{Column, EMPTY, PIECE, Triangle};
@@ -11,7 +11,7 @@ use super::{RegressorError, check_rows};
 use axisight_scalar::Scalar;
 use rayon::prelude::*;
 
-/// What to accumulate.
+/// Input of [`Regressor::factors`].
 #[derive(Debug, Clone, Copy)]
 pub struct FactorRequest<'a> {
     /// Torque, row-major `(n_samples, n_rows)` [Nm].
@@ -20,35 +20,35 @@ pub struct FactorRequest<'a> {
     pub weight: Option<&'a [f64]>,
     /// Columns to keep, increasing.
     pub columns: &'a [usize],
-    /// Values of all parameters whose part is taken off the torque; zero elsewhere.
+    /// Known values of parameters whose torque is subtracted; zero for all other parameters.
     pub known: &'a [f64],
-    /// Number of blocks of samples, of equal length as far as possible.
+    /// Number of blocks of samples. Their lengths are as equal as possible.
     pub blocks: usize,
 }
 
 /// Upper triangular factors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Factors {
-    /// Row-major `(n_blocks, n_rows, k + 1, k + 1)` for k columns; the last is the torque.
+    /// Row-major `(n_blocks, n_rows, k + 1, k + 1)` for k columns. The last column is the torque.
     pub factor: Vec<f64>,
-    /// Samples in each block.
+    /// Number of samples in each block.
     pub lengths: Vec<usize>,
 }
 
-/// One row of the regressor as the request wants it.
+/// One row of the regressor, as requested.
 struct Plan {
-    /// Place among the kept columns, and entry of the row.
+    /// Pairs of a place among the kept columns and an entry of the row.
     kept: Vec<(usize, usize)>,
-    /// Entry of the row and value.
+    /// Pairs of an entry of the row and a value.
     known: Vec<(usize, f64)>,
 }
 
 impl Regressor {
-    /// Accumulate the factors; memory does not grow with the number of samples.
+    /// Accumulate the factors. The memory does not grow with the number of samples.
     ///
     /// # Errors
-    /// [`RegressorError`] for arrays of unequal or wrong size or not finite, or columns out
-    /// of order or out of range.
+    /// [`RegressorError`] if an array has the wrong size or is not finite, the columns are out of
+    /// order or out of range, or the number of blocks is not between 1 and the number of samples.
     pub fn factors(
         &self,
         motion: &Motion<'_>,
@@ -144,7 +144,7 @@ impl Regressor {
                 self.sweep(&mut scratch, motion, first);
                 for (r, (plan, piece)) in plans.iter().zip(&mut pieces).enumerate() {
                     let sample = |x: &[f64], lane: usize| x[(first + lane) * n_rows + r];
-                    // Zero where a lane has no sample.
+                    // The weight is zero in lanes without a sample.
                     let mut weight = [0.0; LANES];
                     for (lane, weight) in weight.iter_mut().enumerate().take(lanes) {
                         *weight = request.weight.map_or(1.0, |weight| sample(weight, lane));
@@ -177,7 +177,7 @@ impl Regressor {
     }
 }
 
-/// Put the triangles of rows, which hold their own columns only, at their places.
+/// Copy the triangles of the rows, which hold their own columns only, to their places.
 fn spread(plans: &[Plan], triangles: &[Triangle], order: usize, out: &mut [f64]) {
     let blocks = out.chunks_exact_mut(order * order);
     for ((plan, triangle), out) in plans.iter().zip(triangles).zip(blocks) {

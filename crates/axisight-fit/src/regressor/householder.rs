@@ -1,22 +1,22 @@
-//! Triangular factor of tall matrices that come in pieces.
+//! Triangular factor of tall matrices that arrive in pieces.
 
 use super::evaluate::LANES;
 
-/// Rows of a piece; a piece of 40 columns fits in the second-level cache.
+/// Number of rows of a piece. A piece of 40 columns fits in the second-level cache.
 pub(super) const PIECE: usize = 256;
-/// Reflections applied together.
+/// Number of reflections that are applied together.
 const PANEL: usize = 4;
 
-/// One column of a piece, by groups of lanes, so that no length needs a check.
+/// One column of a piece, in groups of lanes, so that no length needs a check.
 pub(super) type Column = [[f64; LANES]; PIECE / LANES];
 /// A column of zeros.
 pub(super) const EMPTY: Column = [[0.0; LANES]; PIECE / LANES];
 
-/// The triangular factor R of rows seen so far.
+/// Triangular factor R of all rows so far.
 #[derive(Debug, Clone)]
 pub(super) struct Triangle {
     n: usize,
-    /// Row-major; below the diagonal zero.
+    /// Row-major; zero below the diagonal.
     pub(super) factor: Vec<f64>,
 }
 
@@ -28,12 +28,13 @@ impl Triangle {
         }
     }
 
-    /// Take in a piece of `n` columns; zero rows are nothing. Destroys it.
+    /// Add a piece of `n` columns to the factor, and overwrite the piece. Rows of zeros have no
+    /// effect.
     ///
-    /// Householder reflections on a triangle over a full block touch one row of the triangle
-    /// each, so nothing below its diagonal fills in. They are applied `PANEL` at a time, as
-    /// `1 - V T^T V^T` (Schreiber and Van Loan 1989), so that every number fetched is used
-    /// that often.
+    /// A Householder reflection of the triangle over a full block changes one row of the triangle,
+    /// so nothing below its diagonal fills in. `PANEL` reflections are applied at a time, as
+    /// `1 - V T^T V^T` (Schreiber and Van Loan 1989), so that every number is used that often once
+    /// it is loaded.
     pub(super) fn update(&mut self, piece: &mut [Column]) {
         let mut first = 0;
         let mut rest = piece;
@@ -52,7 +53,7 @@ impl Triangle {
         self.reflect_panel(first, rest);
     }
 
-    /// Reflect the columns of a panel one after the other.
+    /// Reflect the columns of a panel, one after the other.
     fn reflect_panel(&mut self, first: usize, panel: &mut [Column]) -> Reflections {
         let n = self.n;
         let mut out = Reflections {
@@ -64,14 +65,14 @@ impl Triangle {
             let (v, before) = (&head[j], &head[..j]);
             let row = &mut self.factor[(first + j) * n..(first + j + 1) * n];
             let below = dot(v, v);
-            // Rounding of rounding, as a piece with fewer rows than columns leaves: its square is not
-            // a number that one can divide by.
+            // A piece with fewer rows than columns leaves only rounding errors here. Their square
+            // is too small for a division.
             if below < NOTHING {
                 continue;
             }
             let pivot = row[first + j];
             let norm = pivot.mul_add(pivot, below).sqrt();
-            // The sign that adds, so that nothing cancels.
+            // With this sign, nothing cancels.
             let signed = if pivot < 0.0 { -norm } else { norm };
             let leading = pivot + signed;
             let scale = 2.0 / leading.mul_add(leading, below);
@@ -123,7 +124,7 @@ impl Triangle {
 /// Sum of squares below which a column is zero.
 const NOTHING: f64 = 1e-280;
 
-/// Reflections of a panel: their entries in the triangle and the matrix that joins them.
+/// Reflections of a panel: their entries in the triangle, and the matrix that combines them.
 struct Reflections {
     leading: [f64; PANEL],
     t: [[f64; PANEL]; PANEL],
@@ -131,7 +132,7 @@ struct Reflections {
 
 #[inline(always)]
 fn dot(a: &Column, b: &Column) -> f64 {
-    // Two sums, as a multiply-add takes four cycles and two start in each.
+    // Two sums, because a multiply-add takes four cycles and two start in each cycle.
     let mut sums = [[0.0; LANES]; 2];
     for (x, y) in a.chunks_exact(2).zip(b.chunks_exact(2)) {
         for half in 0..2 {
@@ -183,7 +184,7 @@ mod tests {
 
     #[test]
     fn normal_equations_are_those_of_the_rows() {
-        // R^T R = A^T A for rows that come in two pieces, the second with a zero column.
+        // R^T R = A^T A for rows that arrive in two pieces, the second with a zero column.
         let n = 7;
         let entry = |i: usize, j: usize| ((i * 7 + j * 13) as f64 * 0.37).sin() + 0.1 * j as f64;
         let mut triangle = Triangle::new(n);

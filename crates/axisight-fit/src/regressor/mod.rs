@@ -1,9 +1,9 @@
 //! The torque regressor of a chain, linear in its inertial parameters (thesis (4.2)).
 //!
-//! With the mass, the first moments and the inertia about the link's own frame as parameters
-//! of each link, inverse dynamics is linear: `tau = Phi(q, q', q'') theta`. [`Regressor`]
-//! evaluates `Phi`, the energy of (4.3), and, for any number of samples in constant memory,
-//! the triangular factors of `[Phi | tau]` that least squares needs.
+//! The parameters of each link are its mass, its first moments and its inertia about the link's own
+//! frame. Inverse dynamics is linear in them: `tau = Phi(q, q', q'') theta`. [`Regressor`]
+//! evaluates `Phi`, the energy of (4.3), and the triangular factors of `[Phi | tau]` that least
+//! squares needs. The factors take constant memory for any number of samples.
 
 mod chain;
 mod energy;
@@ -19,15 +19,15 @@ pub use extra::{Extra, Signal};
 pub use factors::{FactorRequest, Factors};
 pub use parameters::link_parameters;
 
-/// A regressor cannot be built or evaluated.
+/// Error: a regressor cannot be built or evaluated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{field}: expected {expected}, got {got}")]
 pub struct RegressorError {
     /// Name of the argument.
     pub field: String,
-    /// What it should be.
+    /// Expected value.
     pub expected: String,
-    /// What came.
+    /// Actual value.
     pub got: String,
 }
 
@@ -41,7 +41,7 @@ impl RegressorError {
     }
 }
 
-/// Check length and finiteness of a row-major array.
+/// Check the length of a row-major array, and that its entries are finite.
 fn check_rows(
     field: &str,
     x: &[f64],

@@ -1,9 +1,10 @@
-//! The parameters of the regressor in a robot description.
+//! Parameters of the regressor, from a robot description.
 
 use axisight_plant::robot::{Link, RobotDescription};
 
-/// Mass, first moments and inertia about the link frame of every loaded link, in chain
-/// order, ten each: m, mx, my, mz, xx, yy, zz, xy, xz, yz.
+/// Mass, first moments and inertia about the link frame of every link with mass, in chain order.
+///
+/// Each link has ten parameters: m, mx, my, mz, xx, yy, zz, xy, xz, yz [kg, kg m, kg m^2].
 pub fn link_parameters(robot: &RobotDescription) -> Vec<f64> {
     let links = robot.joints.iter().filter_map(|joint| joint.link.as_ref());
     links.flat_map(about_frame).collect()

@@ -1,4 +1,4 @@
-//! What a fit must be given, field by field.
+//! Checks of the input of a fit, field by field.
 
 use super::error::{FrequencyFitError, invalid};
 use super::hold::Hold;
@@ -110,7 +110,7 @@ pub(super) fn check_pose(
     Ok(())
 }
 
-/// Which elements the uncertainty leaves out.
+/// Check the uncertainty; returns for each element whether the uncertainty leaves it out.
 fn check_uncertainty(
     uncertainty: &Uncertainty,
     elements: usize,

@@ -1,15 +1,16 @@
-//! Responses and their derivatives, element by element over the lines.
+//! Responses and their derivatives, by element over the lines.
 
 use nalgebra::{Complex, DMatrix};
 
 type C = Complex<f64>;
 
-/// The response (column 0) and its derivatives over the lines, upper elements only: a robot
-/// of passive joints has a symmetric response.
+/// The response (column 0) and its derivatives over the lines.
+///
+/// Only upper elements are stored, because a robot of passive joints has a symmetric response.
 pub struct Columns {
     pub(super) n_axes: usize,
     pub(super) n_lines: usize,
-    /// Column `p n_elements + element`; real parts of all lines, then imaginary parts.
+    /// Column `p n_elements + element`: the real parts of all lines, then the imaginary parts.
     pub(super) data: DMatrix<f64>,
 }
 
@@ -39,8 +40,8 @@ impl Columns {
         p * (m * (m + 1) / 2) + a * m - a * (a + 1) / 2 + b
     }
 
-    /// Real and imaginary parts over the lines: of the response (`p = 0`) or of its
-    /// derivative with respect to parameter `p - 1`.
+    /// Real and imaginary parts over the lines, for the response (`p = 0`) or for its derivative
+    /// with respect to parameter `p - 1`.
     pub fn parts(&self, p: usize, output: usize, input: usize) -> (&[f64], &[f64]) {
         let start = self.column(p, output, input) * 2 * self.n_lines;
         self.data.as_slice()[start..start + 2 * self.n_lines].split_at(self.n_lines)

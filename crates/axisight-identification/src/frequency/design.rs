@@ -1,22 +1,24 @@
 //! D-optimal choice of operating points from candidates.
 //!
-//! Every candidate gives an information matrix; the choice maximizes `log det` of their sum.
-//! Relaxed to shares of a total (Wernholt and Löfberg 2007; Wernholt and Moberg 2011) that is
-//! convex. The multiplicative algorithm (Silvey, Titterington, Torsney 1978) and vertex
-//! exchanges (Böhning 1986) take turns until the equivalence theorem of Kiefer and Wolfowitz
-//! (1960) certifies the result: `f* - f <= max_i tr(M^-1 M_i) - sum_j w_j tr(M^-1 M_j)`.
-//! Whole numbers follow by exchanges (Fedorov 1972), measured against that upper bound.
+//! Every candidate gives an information matrix, and the choice maximizes `log det` of their sum.
+//!
+//! The relaxation to shares of a total is convex (Wernholt and Löfberg 2007; Wernholt and Moberg
+//! 2011). The multiplicative algorithm (Silvey, Titterington, Torsney 1978) alternates with vertex
+//! exchanges (Böhning 1986). The equivalence theorem of Kiefer and Wolfowitz (1960) bounds the
+//! error: `f* - f <= max_i tr(M^-1 M_i) - sum_j w_j tr(M^-1 M_j)`.
+//!
+//! Exchanges then give whole numbers (Fedorov 1972), which are compared with that upper bound.
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
-/// How many of what.
+/// Settings of the choice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DesignOptions {
-    /// Operating points to choose.
+    /// Number of operating points to choose.
     pub count: usize,
     /// Whether a candidate may be chosen several times.
     pub repeats: bool,
-    /// The relaxation is solved to this share of a unit of `log det`.
+    /// Largest accepted error of the relaxation, in units of `log det`.
     pub gap_tolerance: f64,
     /// Largest number of iterations of the relaxation.
     pub max_iterations: usize,
@@ -27,26 +29,27 @@ pub struct DesignOptions {
 pub struct Design {
     /// Share of each candidate in the relaxed optimum.
     pub weights: Vec<f64>,
-    /// `tr(M^-1 M_i)` at the relaxed optimum: at most the number of parameters.
+    /// `tr(M^-1 M_i)` at the relaxed optimum, at most the number of parameters.
     pub sensitivity: Vec<f64>,
-    /// What the relaxed `log det` may still lack.
+    /// Bound on the error of the relaxed `log det`.
     pub gap: f64,
     /// Upper bound on `log det` of any choice of `count` candidates.
     pub bound: f64,
-    /// Chosen candidates, ascending.
+    /// Chosen candidates, in ascending order.
     pub chosen: Vec<usize>,
-    /// `log det` of their information.
+    /// `log det` of the information of the chosen candidates.
     pub log_det: f64,
-    /// Iterations of the relaxation.
+    /// Number of iterations of the relaxation.
     pub iterations: usize,
 }
 
-/// All candidates together leave a combination of parameters unknown.
+/// Error: all candidates together leave a combination of parameters unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("candidates: expected operating points that together determine all parameters")]
 pub struct DesignError;
 
-/// Choose `count` of the candidates with information `matrices`, besides `prior` information.
+/// Choose `count` of the candidates with the information `matrices`, in addition to the `prior`
+/// information.
 ///
 /// # Errors
 /// [`DesignError`] if the sum of all matrices is singular.
@@ -131,7 +134,7 @@ impl<'a> Relaxed<'a> {
             .collect()
     }
 
-    /// Bound on what the relaxation still lacks.
+    /// Bound on the error of the relaxed `log det`.
     fn gap(&self) -> f64 {
         let sensitivity = self.sensitivity();
         let mean: f64 = sensitivity
@@ -175,7 +178,7 @@ impl<'a> Relaxed<'a> {
         let change = &self.matrices[to] - &self.matrices[from];
         let most = self.weights[from];
         let (mut low, mut high) = (0.0, most);
-        // The slope falls along the move: bisect for its zero.
+        // The slope falls along the move, so bisection finds its zero.
         for _ in 0..30 {
             let middle = 0.5 * (low + high);
             let mut weights = self.weights.clone();
@@ -209,7 +212,7 @@ fn factor(
     sum.cholesky().ok_or(DesignError)
 }
 
-/// Whole numbers near `weights`, bettered by exchanges of one for another.
+/// Whole numbers near `weights`, improved by exchanges of single candidates.
 fn whole(
     matrices: &[DMatrix<f64>],
     prior: &DMatrix<f64>,
@@ -220,7 +223,7 @@ fn whole(
     let most = if options.repeats { options.count } else { 1 };
     let mut counts = vec![0_usize; n];
     for _ in 0..options.count {
-        // The candidate whose share is most behind.
+        // The next candidate is the one furthest below its share.
         let behind = |i: &usize| weights[*i] * options.count as f64 - counts[*i] as f64;
         let open = (0..n).filter(|i| counts[*i] < most);
         if let Some(next) = open.max_by(|i, j| behind(i).total_cmp(&behind(j))) {

@@ -1,4 +1,5 @@
-//! Responses by one linear solution per line: slower than by poles, right for any robot.
+//! Responses by one linear solution per line. This is slower than by poles, but valid for any
+//! robot.
 
 use super::columns::Columns;
 use super::hold::{Hold, point};
@@ -7,7 +8,8 @@ use nalgebra::{Complex, DMatrix};
 
 type C = Complex<f64>;
 
-/// The response at `frequency_hz` and its derivatives; `None` without a positive inertia.
+/// The response at `frequency_hz` and its derivatives; `None` if the inertia matrix is not positive
+/// definite.
 pub(super) fn evaluate(
     model: &SecondOrder,
     derivatives: &[SecondOrderDerivative],
@@ -48,7 +50,7 @@ fn continuous(
     Some(out)
 }
 
-/// `[A B; 0 0] T` in coordinates where the inertia is one.
+/// `[A B; 0 0] T`, in coordinates in which the inertia matrix is the identity.
 struct Held {
     joint: DMatrix<f64>,
     derivatives: Vec<DMatrix<f64>>,
@@ -65,7 +67,7 @@ fn held(model: &SecondOrder, derivatives: &[SecondOrderDerivative], step: f64) -
     let (k, d) = (whiten(&model.stiffness)?, whiten(&model.damping)?);
     let e = factor.solve_lower_triangular(&model.input)?;
     let size = 2 * n + m;
-    // Rows of the accelerations; those of the displacements do not change.
+    // Rows of the accelerations only, because the rows of the displacements do not change.
     let assemble = |k: DMatrix<f64>, d: DMatrix<f64>, e: DMatrix<f64>| {
         let mut joint = DMatrix::zeros(size, size);
         joint.view_mut((n, 0), (n, n)).copy_from(&(k * -step));
@@ -104,7 +106,7 @@ fn sampled(
     } = held(model, derivatives, step)?;
     let (m, nx, size) = (output.nrows(), output.ncols(), joint.nrows());
     let discrete = joint.clone().exp();
-    // exp [J dJ; 0 J] holds the derivative of exp J in its upper right corner.
+    // The upper right corner of exp [J dJ; 0 J] is the derivative of exp J.
     let changes: Vec<DMatrix<C>> = derivatives
         .iter()
         .map(|change| {

@@ -1,65 +1,65 @@
-//! What can go wrong with a fit of frequency responses.
+//! Errors of fits of frequency responses.
 
 use super::second_order::SecondOrderError;
 
-/// Why responses cannot be fitted.
+/// Reason why responses cannot be fitted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FrequencyFitError {
-    /// Misuse.
+    /// An argument is invalid.
     #[error("{field}: expected {expected}, got {got}")]
     Invalid {
-        /// Argument.
+        /// Name of the argument.
         field: String,
-        /// What it should be.
+        /// Expected value.
         expected: String,
-        /// What came.
+        /// Actual value.
         got: String,
     },
-    /// A weighted criterion without uncertainty.
+    /// The criterion is weighted, but the uncertainty of a response is missing.
     #[error(
         "response {pose}: expected a variance or covariance for a weighted criterion, got none"
     )]
     NoVariance {
-        /// Operating point, from 1.
+        /// Operating point, counted from 1.
         pose: usize,
     },
-    /// A covariance that is none.
+    /// A covariance matrix is not positive definite.
     #[error("response {pose}: expected a positive definite covariance at line {line}")]
     Covariance {
-        /// Operating point, from 1.
+        /// Operating point, counted from 1.
         pose: usize,
-        /// Line, from 1.
+        /// Line, counted from 1.
         line: usize,
     },
     /// The robot cannot be linearized.
     #[error("operating point {pose}: {source}")]
     Robot {
-        /// Operating point, from 1.
+        /// Operating point, counted from 1.
         pose: usize,
-        /// Why.
+        /// Reason.
         source: SecondOrderError,
     },
-    /// A response of the model is not finite or, for a logarithm, zero.
+    /// A response of the model is not finite, or is zero where a logarithm is needed.
     #[error(
         "operating point {pose}: expected a finite response that is not zero at {frequency_hz} Hz \
          from axis {input} to axis {output}; leave the element out if the axes do not couple"
     )]
     NotFinite {
-        /// Operating point, from 1.
+        /// Operating point, counted from 1.
         pose: usize,
-        /// Line [Hz].
+        /// Frequency of the line [Hz].
         frequency_hz: f64,
-        /// Axis, from 1.
+        /// Output axis, counted from 1.
         output: usize,
-        /// Axis, from 1.
+        /// Input axis, counted from 1.
         input: usize,
     },
-    /// Another thread asked to stop.
+    /// Another thread cancelled the fit.
     #[error("cancelled")]
     Cancelled,
 }
 
-/// Misuse of `field`.
+/// A [`FrequencyFitError::Invalid`] for `field`.
 pub(super) fn invalid(
     field: &str,
     expected: &str,

@@ -1,33 +1,35 @@
-//! What a pole contributes to a frequency response, continuous or sampled.
+//! Contribution of a pole to a frequency response, continuous or sampled.
 
 use nalgebra::Complex;
 
 type C = Complex<f64>;
 
-/// How the torque reaches the plant between samples.
+/// The course of the torque between samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Hold {
-    /// `G(i w)`.
+    /// Continuous, for `G(i w)`.
     Continuous,
-    /// `G(e^{i w T})`, the torque held over each sample of length `T` [s].
+    /// Held over each sample of length `T` [s], for `G(e^{i w T})`.
     ZeroOrder(f64),
 }
 
-/// A pole as the responses need it: a partial fraction `1 / (s - lambda)` becomes
-/// `g = phi / (z - e)` with `phi = (e - 1) / lambda`, `e = exp(lambda T)` under a hold.
+/// A pole, in the form of the responses.
+///
+/// A partial fraction `1 / (s - lambda)` becomes `g = phi / (z - e)` under a hold, with
+/// `phi = (e - 1) / lambda` and `e = exp(lambda T)`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pole {
     pub(super) value: C,
     /// `e - 1`.
     shift: C,
-    /// `phi` and its slope over `lambda`.
+    /// `phi`, followed by its slope over `lambda`.
     phi: C,
     phi_slope: C,
     /// Slope of `e` over `lambda`.
     shift_slope: C,
 }
 
-/// Below this size power series replace quotients that cancel.
+/// Below this size, power series replace quotients that cancel.
 const SERIES_BELOW: f64 = 0.5;
 
 impl Pole {
@@ -45,7 +47,7 @@ impl Pole {
         };
         let x = value * step;
         let (first, second) = if x.norm() < SERIES_BELOW {
-            // sum x^k / (k + 1)! and sum x^k / (k! (k + 2)).
+            // The sums x^k / (k + 1)! and x^k / (k! (k + 2)).
             let (mut term, mut first, mut second) = (C::new(1.0, 0.0), C::default(), C::default());
             for k in 0..20 {
                 let k = f64::from(k);
@@ -67,7 +69,7 @@ impl Pole {
         }
     }
 
-    /// The pole mirrored on the real axis.
+    /// The complex conjugate of the pole.
     pub(super) fn conjugate(&self) -> Self {
         Self {
             value: self.value.conj(),
@@ -87,13 +89,13 @@ impl Pole {
         (g, self.phi_slope * inverse + g * self.shift_slope * inverse)
     }
 
-    /// `(g_a - g_b) / (lambda_a - lambda_b)` of two poles close together.
+    /// `(g_a - g_b) / (lambda_a - lambda_b)` for two poles close together.
     pub(super) fn divided_difference(&self, other: &Self, point: C, hold: Hold) -> C {
         let (a, b) = (1.0 / (point - self.shift), 1.0 / (point - other.shift));
         let Hold::ZeroOrder(step) = hold else {
             return a * b;
         };
-        // The mean slope of phi is right to second order in the difference, which is small.
+        // The mean slope of phi has an error of second order in the difference, which is small.
         let phi = (self.phi_slope + other.phi_slope) * 0.5;
         let half = (self.value - other.value) * (0.5 * step);
         let e = ((self.value + other.value) * (0.5 * step)).exp() * (1.0 + half * half / 6.0);

@@ -1,7 +1,7 @@
-//! The search for the parameters of a linearized robot, over logarithms where they are asked for.
+//! The search for the parameters of a linearized robot, over logarithms if requested.
 //!
-//! One evaluation per trial gives loss and normal equations: with all derivatives at the price
-//! of two or three responses, a trial that is accepted has nothing left to compute.
+//! One evaluation per trial gives the loss and the normal equations. All derivatives together cost
+//! as much as two or three responses, so an accepted trial needs no further evaluation.
 
 use super::error::FrequencyFitError;
 use super::problem::{FrequencyProblem, Scatter};
@@ -10,56 +10,57 @@ use axisight_numerics::descent::{
 };
 use nalgebra::{DMatrix, DVector};
 
-/// When a search stops.
+/// Limits of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchOptions {
     /// Largest number of accepted steps.
     pub max_iterations: usize,
-    /// Stop when a step promises to lower the loss by less than this share.
+    /// Stop if the linear model predicts a reduction of the loss below this share.
     pub gain_tolerance: f64,
-    /// Stop when no parameter moves by more than this (a share, where searched over logarithms).
+    /// Stop if no parameter moves by more than this value, or by this share if it is searched over
+    /// its logarithm.
     pub step_tolerance: f64,
 }
 
-/// Result of a search; matrices run over the free parameters as searched.
+/// Result of a search. Matrices cover the free parameters in their search units.
 #[derive(Debug, Clone)]
 pub struct FrequencyFit {
-    /// How it ended.
+    /// Why the search ended.
     pub status: Status,
-    /// All parameters in their own units.
+    /// All parameters, in their own units.
     pub values: Vec<f64>,
-    /// Slope of the value over the searched number, for the free parameters.
+    /// Slopes of the values over their search units, for the free parameters.
     pub slopes: Vec<f64>,
-    /// Positions of the free parameters.
+    /// Indices of the free parameters.
     pub free: Vec<usize>,
-    /// Loss, prior excluded.
+    /// Loss without the priors.
     pub loss: f64,
-    /// Loss at the start, prior excluded.
+    /// Loss at the start, without the priors.
     pub initial_loss: f64,
-    /// Accepted steps.
+    /// Number of accepted steps.
     pub iterations: usize,
-    /// Evaluations of the model.
+    /// Number of evaluations of the model.
     pub evaluations: usize,
-    /// `J^T W J`, prior included.
+    /// `J^T W J`, with the priors.
     pub matrix: DMatrix<f64>,
-    /// `J^T W r`, prior included.
+    /// `J^T W r`, with the priors.
     pub gradient: DVector<f64>,
-    /// What the residuals say of the covariance.
+    /// Covariance information from the residuals.
     pub scatter: Scatter,
-    /// Parameters on a bound.
+    /// Indices of the parameters on a bound.
     pub at_bound: Vec<usize>,
 }
 
-/// Promise, in variances of one residual, below which a search that no step helps has settled:
-/// what is left is lost in the rounding of the loss.
+/// Predicted reduction, in variances of one residual, below which a search has converged if no step
+/// helps. A smaller reduction is lost in the rounding of the loss.
 const SETTLED: f64 = 1e-3;
-/// Longest step: a factor of e where searched over logarithms.
+/// Longest step in search units; a factor of e over logarithms.
 const LONGEST_STEP: f64 = 1.0;
 
 /// Fit the parameters of `problem` from their initial values.
 ///
 /// # Errors
-/// [`FrequencyFitError`] if the model does not hold at the start, or when cancelled.
+/// [`FrequencyFitError`] if the model is not valid at the start, or if the fit is cancelled.
 pub fn minimize(
     problem: &FrequencyProblem,
     options: SearchOptions,
@@ -95,7 +96,7 @@ pub fn minimize(
 
 /// An evaluated point.
 struct Point {
-    /// Priors included.
+    /// Normal equations, with the priors.
     normal: Normal,
     /// Loss of the residuals.
     plain: f64,
@@ -103,15 +104,15 @@ struct Point {
 
 struct Search<'a> {
     problem: &'a FrequencyProblem,
-    /// All parameters, as searched.
+    /// All parameters, in search units.
     theta: Vec<f64>,
-    /// Mean and standard deviation of the free parameters, as searched.
+    /// Mean and standard deviation of the free parameters, in search units.
     priors: Vec<Option<(f64, f64)>>,
     point: Point,
     evaluations: usize,
 }
 
-/// A parameter as it is searched.
+/// A parameter in search units.
 fn searched(logarithmic: bool, value: f64) -> f64 {
     if logarithmic { value.ln() } else { value }
 }
@@ -173,7 +174,7 @@ impl<'a> Search<'a> {
         Ok((outcome.status, outcome.iterations))
     }
 
-    /// Put the free parameters in their places.
+    /// Copy the free parameters to their places.
     fn place(&mut self, free: &[f64]) {
         for (i, x) in self.problem.free.iter().zip(free) {
             self.theta[*i] = *x;
@@ -205,7 +206,7 @@ impl LeastSquares for Search<'_> {
     }
 }
 
-/// Normal equations with those of the priors.
+/// Normal equations with the priors, and the loss without them.
 fn evaluate(
     problem: &FrequencyProblem,
     priors: &[Option<(f64, f64)>],

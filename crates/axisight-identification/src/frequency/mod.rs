@@ -1,4 +1,4 @@
-//! The linearized robot fitted to frequency responses (thesis section 3.4.2).
+//! Fits of the linearized robot to frequency responses (thesis section 3.4.2).
 
 mod checks;
 mod columns;

@@ -1,10 +1,13 @@
 //! Poles and residues of a linearized robot, and their derivatives.
 //!
-//! `G(s) = E^T Z(s)^-1 E` with `Z(s) = s^2 M + s D + K` is `sum_k l_k r_k^T / (s - lambda_k)`.
-//! A change `dZ` of the matrices gives `-sum_jk l_j (y_j^T dZ(s) u_k) r_k^T / ((s - lambda_j)
-//! (s - lambda_k))`, which partial fractions turn into single and double poles. So a line costs
-//! one evaluation per pole, whatever the number of parameters: everything else is a matrix
-//! product over all lines. Pairs of poles too close for partial fractions keep their product.
+//! With `Z(s) = s^2 M + s D + K`, the response is
+//! `G(s) = E^T Z(s)^-1 E = sum_k l_k r_k^T / (s - lambda_k)`. A change `dZ` of the matrices gives
+//! `-sum_jk l_j (y_j^T dZ(s) u_k) r_k^T / ((s - lambda_j) (s - lambda_k))`, which partial fractions
+//! turn into single and double poles.
+//!
+//! A line therefore costs one evaluation per pole, whatever the number of parameters. All else is a
+//! matrix product over all lines. Pairs of poles that are too close for partial fractions keep
+//! their product.
 
 use super::hold::{Hold, Pole};
 use super::second_order::{SecondOrder, SecondOrderDerivative};
@@ -13,12 +16,12 @@ use nalgebra::{Complex, DMatrix};
 
 type C = Complex<f64>;
 
-/// Eigenvectors worse conditioned than this lose more than half of the digits.
+/// Largest condition number of the eigenvectors. Above it, more than half of the digits are lost.
 const LARGEST_CONDITION: f64 = 1e7;
-/// Poles closer than this share of the fastest frequency keep their product.
+/// Pairs of poles closer than this share of the fastest frequency keep their product.
 const CLOSE: f64 = 1e-5;
 
-/// A pole that stands for itself, or for itself and its conjugate.
+/// A real pole, or a pole that also represents its conjugate.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     pub(super) index: usize,
@@ -28,31 +31,32 @@ pub(super) struct Place {
 /// Poles, mode shapes `u` and left vectors `y` with `Z(s)^-1 = sum_k u_k y_k^T / (s - lambda_k)`.
 pub(super) struct Modal {
     pub(super) poles: Vec<Pole>,
-    /// One of each conjugate pair, and the real poles.
+    /// One pole of each conjugate pair, and the real poles.
     pub(super) places: Vec<Place>,
     /// Pairs `j < k` of poles too close together for partial fractions.
     pub(super) close: Vec<(usize, usize)>,
-    /// `[Re u, Im u]` and `[Re y, Im y]^T`.
+    /// The matrices `[Re u, Im u]` and `[Re y, Im y]^T`.
     right_parts: DMatrix<f64>,
     left_parts: DMatrix<f64>,
-    /// `E^T u` and `E^T y`, `(axes, poles)`.
+    /// The matrices `E^T u` and `E^T y`, `(axes, poles)`.
     output: DMatrix<C>,
     input: DMatrix<C>,
 }
 
-/// `sum_k residue_k g_k + double_k g_k' + sum_pairs pair g_jk`, each entry over the elements
-/// `(a, b)`, `a <= b`, of a symmetric response.
+/// Coefficients of `sum_k residue_k g_k + double_k g_k' + sum_pairs pair g_jk`. Each covers the
+/// elements `(a, b)`, `a <= b`, of a symmetric response.
 pub(super) struct Coefficients {
-    /// `(places, elements)`.
+    /// Coefficients of `g_k`, `(places, elements)`.
     pub(super) residue: Vec<C>,
-    /// The same, of the slopes.
+    /// Coefficients of the slopes `g_k'`, `(places, elements)`.
     pub(super) double: Vec<C>,
-    /// `(pairs, elements)`.
+    /// Coefficients of the close pairs, `(pairs, elements)`.
     pub(super) pair: Vec<C>,
 }
 
 impl Modal {
-    /// `None` if the poles do not separate: nearly defective, or not finite.
+    /// The modes of `model`, or `None` if the poles do not separate: nearly defective, or not
+    /// finite.
     pub(super) fn new(model: &SecondOrder, hold: Hold) -> Option<Self> {
         let n = model.mass.nrows();
         let factor = model.mass.clone().cholesky()?.l();
@@ -61,7 +65,7 @@ impl Modal {
             factor.solve_lower_triangular(&half.transpose())
         };
         let (stiffness, damping) = (whiten(&model.stiffness)?, whiten(&model.damping)?);
-        // Time in units of the fastest mode makes displacements and rates comparable.
+        // In time units of the fastest mode, displacements and rates have similar sizes.
         let pace = stiffness.amax().sqrt().max(damping.amax());
         if !(pace > 0.0 && pace.is_finite()) {
             return None;
@@ -82,7 +86,7 @@ impl Modal {
         if condition.is_nan() || condition >= LARGEST_CONDITION {
             return None;
         }
-        // Back to the coordinates of the model: p = L^-T p'', forces L^-1.
+        // Back to the coordinates of the model: p = L^-T p'' for motions, L^-1 for forces.
         let lift = |m: DMatrix<C>| -> Option<DMatrix<C>> {
             let back = factor.transpose();
             let re = back.solve_upper_triangular(&m.map(|x| x.re))?;
@@ -108,7 +112,7 @@ impl Modal {
         self.output.nrows()
     }
 
-    /// Upper elements of `a b^T`.
+    /// Add `factor` times the upper elements of `a b^T`.
     fn add_outer(&self, out: &mut [C], a: &[C], b: &[C], factor: C) {
         let mut slots = out.iter_mut();
         for i in 0..self.n_axes() {
@@ -141,7 +145,7 @@ impl Modal {
         }
     }
 
-    /// Coefficients of the change of the response.
+    /// Coefficients of a derivative of the response.
     pub(super) fn derivative(&self, change: &SecondOrderDerivative) -> Coefficients {
         let (m, n_elements) = (self.n_axes(), self.n_axes() * (self.n_axes() + 1) / 2);
         let mut out = self.empty();
@@ -176,9 +180,11 @@ impl Modal {
         self.close.contains(&(j.min(k), j.max(k)))
     }
 
-    /// Terms of close pairs: with `n2 s^2 + n1 s + n0 = N(s)` the quotient `N / ((s - a)(s - b))`
-    /// is `(N(a) + N(b)) / 2` over the product, `(n2 (a + b) + n1) / 2` over each pole alone,
-    /// and a constant that cancels in the sum.
+    /// Add the terms of close pairs.
+    ///
+    /// With `n2 s^2 + n1 s + n0 = N(s)`, the quotient `N / ((s - a)(s - b))` has three terms:
+    /// `(N(a) + N(b)) / 2` over the product, `(n2 (a + b) + n1) / 2` over each single pole, and a
+    /// constant. The constants cancel in the sum.
     fn add_close(&self, moved: &Moved, out: &mut Coefficients) {
         let n_elements = self.n_axes() * (self.n_axes() + 1) / 2;
         for (number, (a, b)) in self.close.iter().enumerate() {
@@ -201,16 +207,16 @@ impl Modal {
     }
 }
 
-/// `dM`, `dD`, `dK` seen by the modes.
+/// `dM`, `dD`, `dK` in modal coordinates.
 struct Moved {
-    /// `y_j^T dX u_k` for `dK`, `dD`, `dM`; `None` where the matrix does not change.
+    /// `y_j^T dX u_k` for `dK`, `dD`, `dM`; `None` if the matrix does not change.
     parts: [Option<DMatrix<C>>; 3],
 }
 
 impl Moved {
     fn new(modal: &Modal, change: &SecondOrderDerivative) -> Self {
         let n = modal.poles.len();
-        // Real products over real and imaginary parts side by side.
+        // Real products, with real and imaginary parts side by side.
         let seen = |matrix: &DMatrix<f64>| {
             if matrix.iter().all(|x| *x == 0.0) {
                 return None;
@@ -234,7 +240,7 @@ impl Moved {
         [0, 1, 2].map(|i: usize| self.parts[i].as_ref().map_or(C::default(), |p| p[(j, k)]))
     }
 
-    /// `y_j^T dZ(s) u_k` and `y_k^T dZ(s) u_j`.
+    /// The products `y_j^T dZ(s) u_k` and `y_k^T dZ(s) u_j`.
     fn couple(&self, j: usize, k: usize, s: C) -> (C, C) {
         let (mut into, mut from, mut power) = (C::default(), C::default(), C::new(1.0, 0.0));
         for part in &self.parts {
@@ -247,7 +253,7 @@ impl Moved {
         (into, from)
     }
 
-    /// `y_k^T dZ(s) u_k` and its slope over `s`.
+    /// The product `y_k^T dZ(s) u_k` and its slope over `s`.
     fn own(&self, k: usize, s: C) -> (C, C) {
         let [stiffness, damping, mass] = self.polynomial(k, k);
         (
@@ -284,7 +290,7 @@ fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(move |j| (j + 1..n).map(move |k| (j, k)))
 }
 
-/// Real poles and one of each pair; `None` if conjugates are missing.
+/// Real poles and one pole of each pair; `None` if a conjugate is missing.
 fn places(poles: &[C]) -> Option<Vec<Place>> {
     let upper = poles.iter().filter(|p| p.im > 0.0).count();
     let lower = poles.iter().filter(|p| p.im < 0.0).count();

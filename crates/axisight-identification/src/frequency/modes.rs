@@ -7,7 +7,7 @@ use nalgebra::Complex;
 /// One eigenvalue of the linearized plant.
 #[derive(Debug, Clone)]
 pub struct Mode {
-    /// Eigenvalue [rad/s]; of a complex pair, the one with positive imaginary part.
+    /// Eigenvalue [rad/s]. A complex pair is represented by the one with positive imaginary part.
     pub eigenvalue: Complex<f64>,
     /// Undamped frequency |lambda| / 2 pi [Hz].
     pub frequency_hz: f64,
@@ -17,18 +17,18 @@ pub struct Mode {
     pub shape: Vec<Complex<f64>>,
 }
 
-/// The eigenvalue iteration did not converge (the matrix has non-finite entries).
+/// Error: the eigenvalue iteration did not converge, because the matrix has non-finite entries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("eigenvalues of the linearization did not converge; expected finite parameters")]
 pub struct ModesError;
 
-/// All modes, slowest first; each complex pair appears once.
+/// All modes, slowest first. Each complex pair appears once.
 ///
 /// # Errors
 /// [`ModesError`] if the eigenvalue iteration fails.
 pub fn modes(linear: &Linearization) -> Result<Vec<Mode>, ModesError> {
     let (values, vectors) = eigen(&linear.a).ok_or(ModesError)?;
-    // A pair's members must not both survive nor both vanish through rounding.
+    // In spite of rounding, exactly one member of each pair must remain.
     let scale = linear.a.amax();
     let pairs = values.iter().zip(vectors.column_iter());
     let mut out: Vec<Mode> = pairs

@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 type C = Complex<f64>;
 
-/// What a fit is made of.
+/// A fit of a linearized robot to responses, checked and whitened.
 pub struct FrequencyProblem {
     pub(super) parameters: Vec<FrequencyParameter>,
     pub(super) free: Vec<usize>,
@@ -36,28 +36,28 @@ pub struct FrequencyProblem {
 struct Prepared {
     data: PoseResponse,
     whitening: Whitening,
-    /// Variance that the response's uncertainty makes a residual have, per element.
+    /// Variance of a residual due to the uncertainty of the response, per element.
     expected: Option<Vec<f64>>,
 }
 
-/// What the end of a fit reports besides its normal equations.
+/// Covariance information at the end of a fit, besides the normal equations.
 #[derive(Debug, Clone)]
 pub struct Scatter {
-    /// Covariance of `J^T W r` by the response's uncertainty; `None` if unknown.
+    /// Covariance of `J^T W r` due to the uncertainty of the responses; `None` if that is unknown.
     pub expected: Option<DMatrix<f64>>,
-    /// Sum over blocks of lines of the squared gradient.
+    /// Sum of the squared gradients of blocks of lines.
     pub blocks: DMatrix<f64>,
-    /// Complex residuals of all poses, `(line, output, input)` one after the other.
+    /// Complex residuals of all poses, one after the other, each `(line, output, input)`.
     pub residual: Vec<C>,
-    /// Residuals that count.
+    /// Number of residuals that are used, real and imaginary parts.
     pub count: usize,
 }
 
 impl FrequencyProblem {
-    /// Check and whiten.
+    /// Check the input and compute the whitening.
     ///
     /// # Errors
-    /// [`FrequencyFitError`] for misuse.
+    /// [`FrequencyFitError`] if the input is invalid.
     pub fn new(
         robot: RobotDescription,
         settings: Vec<EffectSetting<f64>>,
@@ -98,7 +98,7 @@ impl FrequencyProblem {
         })
     }
 
-    /// Values of all parameters in their own units; `theta` are those of the search.
+    /// Values of all parameters in their own units, for `theta` in search units.
     pub fn values(&self, theta: &[f64]) -> Vec<f64> {
         let natural = |(p, x): (&FrequencyParameter, &f64)| match (p.frozen, p.logarithmic) {
             (true, _) => p.initial,
@@ -108,11 +108,10 @@ impl FrequencyProblem {
         self.parameters.iter().zip(theta).map(natural).collect()
     }
 
-    /// Loss and normal equations of the free parameters (logarithms where searched so) at
-    /// `theta`.
+    /// Loss and normal equations of the free parameters at `theta`, both in search units.
     ///
     /// # Errors
-    /// [`FrequencyFitError`] where the model does not hold.
+    /// [`FrequencyFitError`] if the model is not valid at `theta`, or if the fit is cancelled.
     pub fn evaluate(&self, theta: &[f64]) -> Result<Normal, FrequencyFitError> {
         let mut sum = Normal::zero(self.free.len());
         for part in self.each_pose(theta, |_, residuals| residuals.normal())? {
@@ -121,23 +120,23 @@ impl FrequencyProblem {
         Ok(sum)
     }
 
-    /// Number of residuals that count, real and imaginary parts.
+    /// Number of residuals that are used, real and imaginary parts.
     pub(super) fn count(&self) -> usize {
         self.poses.iter().map(|pose| 2 * pose.n_used()).sum()
     }
 
-    /// Normal matrix of every pose at `theta`: the information it gives.
+    /// Normal matrix of every pose at `theta`, which is the information of the pose.
     ///
     /// # Errors
-    /// [`FrequencyFitError`] where the model does not hold.
+    /// [`FrequencyFitError`] if the model is not valid at `theta`, or if the fit is cancelled.
     pub fn information(&self, theta: &[f64]) -> Result<Vec<DMatrix<f64>>, FrequencyFitError> {
         self.each_pose(theta, |_, residuals| residuals.normal().matrix)
     }
 
-    /// What the residuals at `theta` say of the covariance.
+    /// Covariance information from the residuals at `theta`.
     ///
     /// # Errors
-    /// [`FrequencyFitError`] where the model does not hold.
+    /// [`FrequencyFitError`] if the model is not valid at `theta`, or if the fit is cancelled.
     pub fn scatter(&self, theta: &[f64]) -> Result<Scatter, FrequencyFitError> {
         let parts = self.each_pose(theta, |pose, residuals| {
             let lines = pose.data.frequency_hz.len();
@@ -224,7 +223,7 @@ impl FrequencyProblem {
         Ok(residuals)
     }
 
-    /// Deviations and their derivatives, whitened where elements stand alone.
+    /// Deviations and their derivatives, whitened if the elements have separate factors.
     fn compare(&self, pose: &Prepared, columns: &Columns, slopes: &[f64]) -> Residuals {
         let (lines, m) = (pose.data.frequency_hz.len(), self.robot.n_axes());
         let size = 2 * lines * m * m;
@@ -255,7 +254,7 @@ impl FrequencyProblem {
                 let model = C::new(re[line], im[line]) * powers[line];
                 let (deviation, slope) = match self.criterion {
                     Criterion::Linear => (model - pose.data.response[k], powers[line]),
-                    // The ratio has the phase difference as its angle, wherever either phase is.
+                    // The angle of the ratio is the phase difference, whatever the two phases are.
                     Criterion::Logarithmic => {
                         ((model / pose.data.response[k]).ln(), powers[line] / model)
                     }

@@ -6,7 +6,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 type C = Complex<f64>;
 
-/// Residuals of one pose: `[element][real, imaginary][line]`, weights by element and line.
+/// Residuals of one pose, `[element][real, imaginary][line]`, with weights by element and line.
 pub(super) struct Residuals {
     pub(super) values: Vec<f64>,
     pub(super) weight: Vec<f64>,
@@ -15,14 +15,14 @@ pub(super) struct Residuals {
 }
 
 impl Residuals {
-    /// Multiply the elements of every line by its matrix.
+    /// Multiply the elements of every line by the matrix of that line.
     pub(super) fn whiten(&mut self, matrices: &[DMatrix<C>]) {
         let lines = matrices.len();
         let turn = |values: &mut [f64]| {
             for (line, matrix) in matrices.iter().enumerate() {
                 let n = matrix.nrows();
                 let at = |e: usize| (e * 2 * lines + line, (e * 2 + 1) * lines + line);
-                // From the last row up, what is still needed is not yet overwritten.
+                // From the last row upwards, no value is overwritten before its last use.
                 for row in (0..n).rev() {
                     let term = |k: usize| {
                         let (re, im) = at(k);
@@ -38,7 +38,7 @@ impl Residuals {
         self.jacobian.iter_mut().for_each(|column| turn(column));
     }
 
-    /// Weights of a robust loss, on the magnitude of a complex residual.
+    /// Compute the weights of a robust loss from the magnitudes of the complex residuals.
     pub(super) fn weigh(&mut self, loss: Loss, lines: usize) {
         if loss == Loss::Squared {
             self.loss = self.values.iter().map(|r| r * r).sum();
@@ -86,7 +86,7 @@ impl Residuals {
         }
     }
 
-    /// `J^T V J` with the variances `V` that the response's uncertainty leaves.
+    /// `J^T V J`, with the variances `V` of the residuals due to the uncertainty of the response.
     pub(super) fn expected(&self, variance: &[f64], lines: usize) -> DMatrix<f64> {
         let n_elements = self.values.len() / (2 * lines).max(1);
         let by_place = |k: usize| {
@@ -101,7 +101,7 @@ impl Residuals {
         DMatrix::from_fn(n, n, |i, j| dot(&self.jacobian[i], &other[j]))
     }
 
-    /// Sum over blocks of `block` lines, all elements together, of the squared gradient.
+    /// Sum of the squared gradients of blocks of `block` lines, with all elements together.
     pub(super) fn blocks(&self, lines: usize, block: usize) -> DMatrix<f64> {
         let n = self.jacobian.len();
         let mut sum = DMatrix::zeros(n, n);
@@ -129,7 +129,8 @@ impl Residuals {
     }
 }
 
-/// Inner product with eight partial sums, which vectorises and rounds less.
+/// Inner product with eight partial sums, which becomes vector code and has smaller rounding
+/// errors.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (chunks_a, tail_a) = a.as_chunks::<8>();

@@ -9,8 +9,9 @@ use nalgebra::{Complex, DMatrix};
 
 type C = Complex<f64>;
 
-/// Response from motor torque to motor angle [rad/Nm] and its derivatives; `None` if the
-/// inertia matrix is not positive definite. Values are not finite on a pole.
+/// Response from motor torque to motor angle [rad/Nm], and its derivatives.
+///
+/// Returns `None` if the inertia matrix is not positive definite. Values are not finite on a pole.
 pub fn evaluate(
     model: &SecondOrder,
     derivatives: &[SecondOrderDerivative],
@@ -57,8 +58,8 @@ fn by_poles(
     out
 }
 
-/// Columns of real coefficients: for a real pole `g`; for a pair `g + h` and `i (g - h)` with
-/// `h` of the conjugate; then the same of the slopes.
+/// Columns for real coefficients: `g` for a real pole, `g + h` and `i (g - h)` for a pair, where
+/// `h` belongs to the conjugate. The same columns of the slopes follow.
 fn basis(modal: &Modal, frequency_hz: &[f64], hold: Hold, with_slopes: bool) -> DMatrix<f64> {
     let (n, n_poles) = (frequency_hz.len(), modal.poles.len());
     let points: Vec<C> = frequency_hz.iter().map(|f| point(*f, hold)).collect();

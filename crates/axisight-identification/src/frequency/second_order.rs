@@ -1,10 +1,12 @@
 //! The linearized robot in second-order form, with exact derivatives.
 //!
-//! At rest at joint angles `q0` the robot obeys `M p'' + D p' + K p = E u` over
-//! `p = [phi, q]`, all three matrices symmetric: `M` holds motor inertias and `M(q0)`, `D` and
-//! `K` the gears, springs and viscous friction, `K` also the gravity stiffness `dg/dq`. The
-//! motor angles are `E^T p`. Elastic joints settle under gravity, so `q0` depends on the
-//! parameters; its derivative follows from the implicit function theorem.
+//! At rest at the joint angles `q0`, the robot obeys `M p'' + D p' + K p = E u` with
+//! `p = [phi, q]`. All three matrices are symmetric. `M` contains the motor inertias and `M(q0)`;
+//! `D` and `K` contain gears, springs and viscous friction; `K` also contains the gravity stiffness
+//! `dg/dq`. The motor angles are `E^T p`.
+//!
+//! Elastic joints settle under gravity, so `q0` depends on the parameters. Its derivative follows
+//! from the implicit function theorem.
 
 use axisight_core::effects::{self, Linear};
 use axisight_core::plant::{EquilibriumError, Plant, PlantError, assemble, equilibrium};
@@ -12,11 +14,11 @@ use axisight_core::robot::{Chain, EffectSetting, Motion, Parameter, RobotDescrip
 use axisight_scalar::{Dual, Scalar};
 use nalgebra::{DMatrix, DVector};
 
-/// Parameters differentiated in one pass.
+/// Number of parameters that one pass differentiates.
 const WIDTH: usize = 8;
 type D = Dual<f64, WIDTH>;
 
-/// `M p'' + D p' + K p = E u`, motor angles `E^T p`.
+/// The linear model `M p'' + D p' + K p = E u` with the motor angles `E^T p`.
 #[derive(Debug, Clone)]
 pub struct SecondOrder {
     /// `M`, symmetric positive definite.
@@ -40,10 +42,10 @@ pub struct SecondOrderDerivative {
     pub stiffness: DMatrix<f64>,
 }
 
-/// Why a robot has no linear model.
+/// Reason why a robot has no linear model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SecondOrderError {
-    /// An effect has a slope at rest that a moving robot does not show.
+    /// An effect has a slope at rest that does not hold in motion.
     #[error(
         "effects: expected only {expected} (the slope of others at rest is not what a moving \
          robot shows; friction under excitation is `viscous_friction` of the axis), got {got}"
@@ -51,24 +53,24 @@ pub enum SecondOrderError {
     Effect {
         /// Effects that only change parameters.
         expected: String,
-        /// The other one.
+        /// The effect that is not one of them.
         got: String,
     },
     /// The plant cannot be built.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// No equilibrium.
+    /// No equilibrium was found.
     #[error(transparent)]
     Equilibrium(#[from] EquilibriumError),
     /// The elastic joints are at an unstable equilibrium.
     #[error("elastic joints: expected springs stiffer than the gravity load")]
     Unstable,
-    /// A link has lost its inertia.
+    /// The inertia matrix is not positive definite.
     #[error("inertia matrix: expected a positive definite one; masses or inertias are too small")]
     Mass,
 }
 
-/// A robot at given parameters, from which poses are linearized.
+/// A robot with given parameters, to be linearized at any pose.
 pub struct Linearizer<'a> {
     robot: &'a RobotDescription,
     motion: Vec<Motion>,
@@ -85,11 +87,11 @@ struct Matrices<S> {
 }
 
 impl<'a> Linearizer<'a> {
-    /// `robot` with `values` of parameters in place; derivatives with respect to `seeds`,
-    /// positions in `values`.
+    /// `robot` with the parameters `values`, and derivatives with respect to `seeds`, which are
+    /// indices into `values`.
     ///
     /// # Errors
-    /// [`SecondOrderError`] for effects that are not linear or parameters that make no robot.
+    /// [`SecondOrderError`] if an effect is not linear, or the plant cannot be built.
     pub fn new(
         robot: &'a RobotDescription,
         settings: &[EffectSetting<f64>],
@@ -124,10 +126,10 @@ impl<'a> Linearizer<'a> {
         })
     }
 
-    /// The model with the driven joints at `driven` [rad], and its derivatives.
+    /// The linear model with the driven joints at `driven` [rad], and its derivatives.
     ///
     /// # Errors
-    /// [`SecondOrderError`] where the arm does not settle.
+    /// [`SecondOrderError`] if the arm does not settle, or settles in an unstable equilibrium.
     pub fn at(
         &self,
         driven: &[f64],
@@ -169,7 +171,7 @@ impl<'a> Linearizer<'a> {
         input
     }
 
-    /// Factorized `K_e + dg_e/dq_e` of the elastic joints.
+    /// Factorized stiffness `K_e + dg_e/dq_e` of the elastic joints.
     fn settled_stiffness(&self, q: &[f64]) -> Result<Settled, SecondOrderError> {
         let elastic = &self.plain.elastic;
         let n = q.len();
@@ -223,9 +225,11 @@ impl<'a> Linearizer<'a> {
         out
     }
 
-    /// `dg/dq`, row-major: `-gravity . (a_i x (a_j x s_j))` for `i <= j` with the axes `a` and
-    /// the first moment `s_j` of all links beyond joint `j` about it; a sliding joint has
-    /// `a_j` times the mass beyond in the place of the inner product.
+    /// Gravity stiffness `dg/dq`, row-major.
+    ///
+    /// For `i <= j` the entry is `-gravity . (a_i x (a_j x s_j))`, with the axes `a` and the first
+    /// moment `s_j` of all links beyond joint `j` about that joint. For a prismatic joint, `a_j`
+    /// times the mass beyond it replaces `a_j x s_j`.
     fn gravity_stiffness<S: Scalar>(&self, chain: &Chain<S>, q: &[S]) -> Vec<S> {
         let n = q.len();
         let poses = chain.poses(q);
@@ -260,7 +264,7 @@ impl<'a> Linearizer<'a> {
 
 type Settled = nalgebra::Cholesky<f64, nalgebra::Dyn>;
 
-/// Joint angles whose derivatives keep the elastic joints in equilibrium.
+/// Joint angles with derivatives that keep the elastic joints in equilibrium.
 fn settled_angles(plant: &Plant<D>, q: &[f64], settled: &Settled) -> Vec<D> {
     let rest: Vec<D> = vec![D::zero(); q.len()];
     let mut angles: Vec<D> = q.iter().map(|x| D::constant(*x)).collect();

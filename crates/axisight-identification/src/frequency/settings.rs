@@ -1,40 +1,40 @@
-//! What is fitted, and by which criterion.
+//! Parameters and criterion of a fit.
 
 use super::hold::Hold;
 use super::weighting::Criterion;
 use crate::logs::Loss;
 use axisight_core::robot::Parameter;
 
-/// One number to fit; bounds, start and prior in its own unit.
+/// One parameter to fit. Bounds, start and prior are in its own unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrequencyParameter {
-    /// What it is.
+    /// The parameter of the robot.
     pub parameter: Parameter,
-    /// Where the search starts.
+    /// Start value of the search.
     pub initial: f64,
     /// Lower bound.
     pub lower: f64,
     /// Upper bound.
     pub upper: f64,
-    /// Searched over its logarithm; start and bounds are positive.
+    /// Whether the search is over the logarithm. Start and bounds must then be positive.
     pub logarithmic: bool,
-    /// Mean and standard deviation of what is known beforehand.
+    /// Prior mean and standard deviation.
     pub prior: Option<(f64, f64)>,
-    /// Kept at its initial value.
+    /// Whether the parameter stays at its initial value.
     pub frozen: bool,
 }
 
 /// How responses are compared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrequencyOptions {
-    /// How the torque reaches the plant.
+    /// The course of the torque between samples.
     pub hold: Hold,
-    /// What is compared.
+    /// The criterion.
     pub criterion: Criterion,
-    /// Weigh by the response's uncertainty.
+    /// Whether deviations are weighted by the uncertainty of the response.
     pub weighted: bool,
-    /// Loss of the magnitude of a complex residual.
+    /// Loss over the magnitude of a complex residual.
     pub loss: Loss,
-    /// Lines in a row whose residuals may depend on each other, for the sandwich covariance.
+    /// Number of successive lines with dependent residuals, for the sandwich covariance.
     pub block_lines: usize,
 }

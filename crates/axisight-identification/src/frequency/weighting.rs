@@ -1,35 +1,36 @@
-//! Criteria (3.42) to (3.44): what is compared, and how a deviation is weighed.
+//! Criteria (3.42) to (3.44): the compared quantity, and the weight of a deviation.
 
 use super::error::FrequencyFitError;
 use nalgebra::{Complex, DMatrix};
 
 type C = Complex<f64>;
 
-/// What is compared.
+/// The compared quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Criterion {
-    /// `G(theta) - G`, (3.42) and (3.43).
+    /// `G(theta) - G`, see (3.42) and (3.43).
     Linear,
-    /// `log(G(theta) / G)`: logarithm of the magnitude and phase, (3.44).
+    /// `log(G(theta) / G)`: log magnitude and phase, see (3.44).
     Logarithmic,
 }
 
-/// What is known of the error of a measured response.
+/// What is known about the error of a measured response.
 #[derive(Debug, Clone)]
 pub enum Uncertainty {
     /// Nothing.
     Unknown,
-    /// `E|dG|^2` of every element, in the order of the response; infinite leaves it out.
+    /// `E|dG|^2` of every element, in the order of the response. An infinite variance leaves the
+    /// element out.
     Variance(Vec<f64>),
-    /// The same, from so few realizations that each element is weighed by another variance, one
-    /// that does not depend on its own.
+    /// `E|dG|^2` from few realizations. Each element is weighted by another variance, which does
+    /// not depend on its own estimate.
     Pooled {
-        /// `E|dG|^2` as estimated, which the covariance of the parameters is taken from.
+        /// Estimated `E|dG|^2`, from which the covariance of the parameters is computed.
         stated: Vec<f64>,
-        /// Variance to weigh by.
+        /// Variance for the weights.
         weighing: Vec<f64>,
     },
-    /// Covariance of the elements of a line, `(line, elements, elements)`, Hermitian.
+    /// Covariance of the elements of each line, `(line, elements, elements)`, Hermitian.
     Covariance(Vec<C>),
 }
 
@@ -38,29 +39,30 @@ pub enum Uncertainty {
 pub struct PoseResponse {
     /// Angles of the driven joints [rad; m if prismatic].
     pub joint_angle: Vec<f64>,
-    /// Lines [Hz].
+    /// Frequencies of the lines [Hz].
     pub frequency_hz: Vec<f64>,
-    /// `(line, output, input)`.
+    /// Measured response, `(line, output, input)`.
     pub response: Vec<C>,
-    /// Its error.
+    /// Error of the response.
     pub uncertainty: Uncertainty,
-    /// What the error of a logarithm is taken relative to; `None` for the response itself.
-    /// Weights by the measured magnitude favour lines where the error adds to it, a model's do not.
+    /// Reference of the relative error of a logarithm; `None` for the response itself. Weights by
+    /// the measured magnitude favour lines where the error increases it, while weights by a model's
+    /// response do not.
     pub reference: Option<Vec<C>>,
     /// Derivative of the motor angle that is the output: 0, 1 or 2.
     pub order: u8,
 }
 
-/// What turns deviations of a line into residuals of unit variance.
+/// Factors that turn deviations of a line into residuals of unit variance.
 pub(super) enum Whitening {
-    /// A factor for every element.
+    /// One factor for every element.
     Elements(Vec<f64>),
-    /// A lower triangular matrix for every line.
+    /// One lower triangular matrix for every line.
     Lines(Vec<DMatrix<C>>),
 }
 
-/// Whitening of a response, and the variance of the real and the imaginary part that its
-/// uncertainty makes each residual have (`None` if unknown).
+/// The whitening of a response, and the variance of real and imaginary part of each residual due to
+/// the uncertainty (`None` if unknown).
 pub(super) fn whitening(
     pose: &PoseResponse,
     criterion: Criterion,
@@ -126,11 +128,12 @@ pub(super) fn whitening(
     }
 }
 
-/// `L^-1` of `L L^H`; `None` if the matrix is not positive definite.
+/// The inverse of the Cholesky factor `L` of a matrix `L L^H`; `None` if the matrix is not positive
+/// definite.
 fn inverse_factor(matrix: DMatrix<C>) -> Option<DMatrix<C>> {
     let n = matrix.nrows();
     let lower = matrix.cholesky()?.l();
-    // The complex square root of a negative pivot is imaginary.
+    // The complex square root of a negative pivot is imaginary, so check for it.
     if (0..n).any(|i| !(lower[(i, i)].re > 0.0 && lower[(i, i)].im.abs() < lower[(i, i)].re)) {
         return None;
     }

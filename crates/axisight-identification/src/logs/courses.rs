@@ -1,8 +1,8 @@
-//! Runs of a model over all logs, for models close to it.
+//! Runs of a model over all logs, for the simulation of similar models.
 //!
-//! A model that differs a little stays close to these runs: its arm may be linearised along
-//! them, which leaves a sixth of the work; motors, gears and effects stay as they are. The error
-//! of that is of second order, and what the runs themselves show of it is known and taken off.
+//! A similar model stays close to these runs, so its arm may be linearised along them. This leaves
+//! a sixth of the work. Motors, gears and effects stay nonlinear. The error is of second order. The
+//! part of it that the runs themselves show is known and is corrected.
 
 use super::packing::LANES;
 use super::problem::ProblemError;
@@ -21,16 +21,16 @@ pub struct Courses {
 /// Runs of a model over all logs, batch by batch, as [`OwnRun`].
 pub type Runs = Vec<Arc<OwnRun>>;
 
-/// A run of a model over logs in lock-step, along which its derivatives can be taken.
+/// A run of a model over logs in lock-step, along which derivatives can be computed.
 ///
-/// The arm is linearised when the first of them is asked for: most trial points need none.
+/// The arm is linearised on demand, because most trial points need no derivatives.
 #[derive(Debug)]
 pub struct OwnRun {
-    /// Output of the model, `[lane * axes + axis]`.
+    /// Output of the model, `[lane * axes + axis][sample]`.
     pub(super) output: Vec<Vec<f64>>,
     chain: Chain<Lanes<LANES>>,
     sample_time: f64,
-    /// Angles and rates of the joints, sample by sample.
+    /// Angles and rates of the joints, for each sample.
     states: Vec<Lanes<LANES>>,
     course: OnceLock<SharedCourse>,
 }
@@ -57,19 +57,20 @@ impl OwnRun {
     }
 }
 
-/// Logs in lock-step.
+/// The run of one batch of logs in lock-step.
 #[derive(Debug, Clone)]
 pub(super) struct Batch {
     pub(super) course: SharedCourse,
-    /// Output of the model less its output with the arm linearised, `[lane * axes + axis]`.
+    /// Output of the model minus its output with the linearised arm,
+    /// `[lane * axes + axis][sample]`.
     pub(super) excess: Vec<Vec<f64>>,
 }
 
 impl Courses {
-    /// Runs of `problem` at `theta`; `None` where its arm cannot be linearised along them.
+    /// Runs of `problem` at `theta`; `None` if its arm cannot be linearised along them.
     ///
     /// # Errors
-    /// [`ProblemError::Diverged`] where the model does not hold.
+    /// [`ProblemError::Diverged`] if the model has no valid run at `theta`.
     pub fn new(
         problem: &SimulationErrorProblem,
         theta: &[f64],
@@ -99,14 +100,14 @@ impl Courses {
         self.batches.get(number)
     }
 
-    /// Whether these are runs of a chain of `joints` joints over `batches` batches.
+    /// Whether the runs have `joints` joints and `batches` batches.
     pub(super) fn fit(&self, joints: usize, batches: usize) -> bool {
         self.batches.len() == batches && self.batches.iter().all(|b| b.course.joints() == joints)
     }
 }
 
 impl Batch {
-    /// Put the excess back on an output.
+    /// Add the excess to an output with the linearised arm.
     pub(super) fn correct(&self, traces: &mut Traces) {
         if let Some(output) = traces.first_mut() {
             for (output, excess) in output.iter_mut().zip(&self.excess) {

@@ -1,32 +1,32 @@
-//! Models that do not hold, told from misuse.
+//! The distinction between a model that has no valid run and invalid input.
 //!
-//! A fit tries models that may be unstable, too stiff or without an equilibrium: that is an answer,
-//! and a caller decides what to make of it. Misuse is none.
+//! A fit tries models that may be unstable, too stiff or without an equilibrium. This is a result
+//! that the caller handles. Invalid input is an error.
 
 use super::problem::ProblemError;
 use axisight_core::effects::EffectError;
 use axisight_core::plant::{EquilibriumError, PlantError};
 use axisight_core::simulation::{CourseOfAnother, SimulationError};
 
-/// Where and why a model does not hold.
+/// Where and why a model has no valid run.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("the simulation failed: {reason}")]
 pub struct Divergence {
-    /// The logs that ran in lock-step, one of which diverged; empty where the model has no run at all.
+    /// The logs in lock-step of which one diverged; empty if the model cannot run at all.
     pub records: Vec<usize>,
-    /// The sample at which it did.
+    /// The sample at which the run diverged.
     pub sample: Option<usize>,
-    /// Why.
+    /// Reason.
     pub reason: String,
 }
 
 impl ProblemError {
-    /// A model that cannot run along any log.
+    /// The error of a model that cannot run along any log.
     pub(super) fn does_not_hold(reason: &impl ToString) -> Self {
         Self::diverged(&[], None, reason)
     }
 
-    /// A run of the logs `records` that ended at a sample.
+    /// The error of a run along the logs `records` that ended at `sample`.
     pub(super) fn diverged(
         records: &[usize],
         sample: Option<usize>,
@@ -47,7 +47,7 @@ impl ProblemError {
 impl From<EffectError> for ProblemError {
     fn from(error: EffectError) -> Self {
         match error {
-            // Whether an effect has a place depends on the robot and on the effects beside it.
+            // Whether an effect can act depends on the robot and its other effects.
             EffectError::Lacking { .. } => Self::does_not_hold(&error),
             EffectError::Unknown { .. }
             | EffectError::ParameterCount { .. }

@@ -1,9 +1,11 @@
 //! Fits with bounds, priors, robust loss and lazy nuisance columns.
 //!
-//! A trial point costs a plain simulation; only an accepted one gets its derivatives, along that
-//! simulation where it can, unless they are few: then most trials are accepted. Derivatives of
-//! nuisance parameters are kept from point to point, so that promises of the linear model are
-//! not relied on.
+//! A trial point costs one simulation without derivatives. Only an accepted point gets its
+//! derivatives, along that simulation if possible. If there are few derivatives, every trial point
+//! gets them at once, because most trials are accepted.
+//!
+//! Derivatives of nuisance parameters are kept from point to point, so the predictions of the
+//! linear model are not reliable and are not used.
 
 use super::courses::Runs;
 use super::gram::BlockGram;
@@ -20,14 +22,14 @@ use nalgebra::{DMatrix, DVector};
 pub struct FitOptions {
     /// Largest number of accepted steps.
     pub max_iterations: usize,
-    /// Stop when the loss falls by less than this share.
+    /// Stop if the loss falls by less than this share.
     pub loss_tolerance: f64,
-    /// Stop when no parameter moves by more than this share of its scale.
+    /// Stop if no parameter moves by more than this share of its scale.
     pub step_tolerance: f64,
     /// Loss of whitened residuals.
     pub loss: Loss,
-    /// How often nuisance columns are computed anew, where a step fails by them or the search has
-    /// gone far from where they were computed.
+    /// How often nuisance columns may be computed again: if a step fails because of them, or if the
+    /// loss has fallen far since they were computed.
     pub nuisance_refreshes: usize,
 }
 
@@ -44,7 +46,7 @@ impl Default for FitOptions {
 }
 
 impl FitOptions {
-    /// Rules of a search with `left` iterations left that gives up after so many `failures` in a row.
+    /// Rules of a search with `left` iterations, which gives up after `failures` in a row.
     fn rules(&self, left: usize, failures: usize) -> Rules {
         Rules {
             max_iterations: left,
@@ -67,32 +69,33 @@ impl FitOptions {
 /// Result of a fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// How it ended.
+    /// Why the fit ended.
     pub status: Status,
-    /// Parameters, frozen ones included.
+    /// All parameters, including frozen ones.
     pub theta: Vec<f64>,
-    /// Loss of the residuals, prior excluded.
+    /// Loss of the residuals, without the priors.
     pub loss: f64,
-    /// Loss at the start, prior excluded.
+    /// Loss at the start, without the priors.
     pub initial_loss: f64,
     /// Number of residuals.
     pub n_residuals: usize,
-    /// Accepted steps.
+    /// Number of accepted steps.
     pub iterations: usize,
-    /// Evaluations of the problem.
+    /// Number of evaluations of the problem.
     pub evaluations: usize,
-    /// Numbers of the free parameters, the order of the matrices below.
+    /// Indices of the free parameters, in the order of the matrices below.
     pub free: Vec<usize>,
-    /// Inverse of the normal matrix (prior included), row-major: covariance for unit white noise.
+    /// Inverse of the normal matrix with the priors, row-major: the covariance for white noise of
+    /// unit variance.
     pub covariance: Vec<f64>,
-    /// Covariance from the scatter of block gradients and that of priors, valid when the residuals are
-    /// correlated or the model is incomplete; row-major.
+    /// Covariance from the scatter of the block gradients and of the priors, row-major. It is valid
+    /// even if residuals are correlated or the model is incomplete.
     pub sandwich: Vec<f64>,
-    /// Condition number of the normal matrix scaled to unit diagonal.
+    /// Condition number of the normal matrix, scaled to a unit diagonal.
     pub condition: f64,
-    /// Free parameters that ended on a bound.
+    /// Indices of the free parameters that ended on a bound.
     pub at_bound: Vec<usize>,
-    /// Normal equations by block.
+    /// Normal equations of each block.
     pub blocks: Vec<BlockGram>,
     /// Whitened residuals.
     pub residual: Vec<f64>,
@@ -102,56 +105,59 @@ pub struct Fit {
     pub up_to_date: bool,
 }
 
-/// Share of the loss that a step has to be worth where a search that no longer moves has not settled.
+/// Predicted reduction, as a share of the loss, above which a search that no longer moves has
+/// stalled.
 const WORTH_A_STEP: f64 = 1e-4;
 
-/// Share of the loss by which it has fallen when columns computed before are no longer good.
+/// Reduction of the loss, as a share, after which nuisance columns are out of date.
 const MOVED: f64 = 0.1;
 
-/// How long a search goes on with the nuisance columns that it has.
+/// How long a search continues with the present nuisance columns.
 #[derive(Debug, Clone, Copy)]
 struct Patience {
-    /// Accepted steps.
+    /// Largest number of accepted steps.
     steps: usize,
-    /// Failures in a row.
+    /// Largest number of failures in a row.
     failures: usize,
 }
 
 impl Patience {
-    /// All columns are renewed at every step.
+    /// For searches that renew all columns at every step.
     const LONG: Self = Self {
         steps: usize::MAX,
         failures: 8,
     };
-    /// The first step by columns as good as they will be.
+    /// For the first step after columns were computed.
     const FIRST: Self = Self {
         steps: 1,
         failures: 3,
     };
-    /// Further steps: what fails by columns of another point is hardly mended by shorter ones.
+    /// For further steps, if columns cannot be renewed. Shorter steps rarely help if columns of
+    /// another point make a step fail.
     const FURTHER: Self = Self {
         steps: usize::MAX,
         failures: 1,
     };
-    /// The same where columns are renewed then.
+    /// For further steps, if columns can be renewed.
     const BRIEF: Self = Self {
         steps: 1,
         failures: 0,
     };
 }
 
-/// Sum of squares of whitened residuals by which a natural change of any parameter is taken to
-/// move them. One that moves them less, a millionth of the noise of one, is left where it is:
-/// the shape of a friction of no size, say.
+/// Smallest influence of a parameter: the sum of squares of the whitened residuals' change for a
+/// natural change of the parameter. A parameter with less influence, a millionth of the noise of
+/// one residual, is not moved. Example: the shape of a friction of zero size.
 const LEAST_INFLUENCE: f64 = 1e-12;
 
-/// Most that the step of a shape is stretched where the size of its effect shrinks.
+/// Largest factor by which the step of a shape is stretched if the size of its effect shrinks.
 const MOST_STRETCHED: f64 = 2.0;
 
-/// Derivatives that a trial point gets at once: as many as cost less than another simulation.
+/// Number of derivatives that every trial point gets at once, because they cost less than another
+/// simulation.
 const FEW: usize = 4;
 
-/// The present point of a fit, with everything the next step needs.
+/// The present point of a fit, with all data for the next step.
 struct Search<'a, P: Problem> {
     problem: &'a P,
     parameters: &'a [FitParameter],
@@ -159,25 +165,28 @@ struct Search<'a, P: Problem> {
     /// All parameters.
     theta: Vec<f64>,
     free: Vec<usize>,
-    /// Columns renewed at every step: positions in `free`.
+    /// Columns that are renewed at every step, as positions in `free`.
     fresh: Vec<usize>,
     columns: Vec<Column>,
     residual: Vec<f64>,
-    /// What derivatives at the present point can be taken along.
+    /// Runs along which derivatives at the present point can be computed.
     runs: Runs,
     blocks: Vec<BlockGram>,
-    /// Loss of the residuals.
+    /// Loss of the residuals, without the priors.
     plain: f64,
-    /// Priors included.
+    /// Normal equations, with the priors.
     normal: Normal,
     evaluations: usize,
 }
 
-/// Fit `parameters` of `problem`. `warm` may hold Jacobian columns from an earlier
-/// fit for nuisance parameters: pairs of parameter number and column.
+/// Fit `parameters` of `problem`.
+///
+/// `warm` may hold Jacobian columns of nuisance parameters from an earlier fit, as pairs of
+/// parameter index and column.
 ///
 /// # Errors
-/// [`ProblemError`] for misuse or when the starting point cannot be evaluated.
+/// [`ProblemError`] if the input is invalid, the start cannot be evaluated, or the fit is
+/// cancelled.
 pub fn fit<P: Problem>(
     problem: &P,
     parameters: &[FitParameter],
@@ -189,7 +198,7 @@ pub fn fit<P: Problem>(
     let mut search = Search::new(problem, parameters, options.loss, start);
     let lazy = search.fresh.len() < search.free.len();
     let mut before = search.normal.loss;
-    // Steps after which all columns were computed.
+    // Number of steps after which all columns were last computed.
     let mut renewed = warm.is_empty().then_some(0);
     let (mut status, mut iterations) = (Status::MaxIterations, 0);
     for left in (0..=options.nuisance_refreshes).rev() {
@@ -199,7 +208,7 @@ pub fn fit<P: Problem>(
             search.descend(&options, iterations, Patience::LONG)?
         };
         let over = status == Status::Exact || iterations == options.max_iterations;
-        // The same columns at the same point would lead nowhere again.
+        // The same columns at the same point would fail again.
         if !lazy || left == 0 || over || renewed == Some(iterations) {
             break;
         }
@@ -212,7 +221,7 @@ pub fn fit<P: Problem>(
         search.refresh()?;
         renewed = Some(iterations);
     }
-    // Columns that are no longer good point no longer where the loss is least.
+    // With columns that are out of date, the search does not end at the minimum.
     let astray = lazy && options.nuisance_refreshes > 0 && search.gone_far(before);
     if astray && status.advice().is_none() {
         status = Status::MaxIterations;
@@ -249,8 +258,8 @@ impl<'a, P: Problem> Search<'a, P> {
         search
     }
 
-    /// Steps from the present point, after `iterations` of them; how the search ended and how many
-    /// steps there are now.
+    /// Take steps from the present point, after `iterations` earlier steps. Returns the status and
+    /// the new number of steps.
     fn descend(
         &mut self,
         options: &FitOptions,
@@ -265,7 +274,8 @@ impl<'a, P: Problem> Search<'a, P> {
         Ok((outcome.status, iterations + outcome.iterations))
     }
 
-    /// The same with nuisance columns that stay as they are, and whether they can be `renewed` then.
+    /// The same as [`Self::descend`], with nuisance columns that stay as they are. `renewed` says
+    /// whether they can be renewed afterwards.
     fn descend_lazily(
         &mut self,
         options: &FitOptions,
@@ -285,7 +295,7 @@ impl<'a, P: Problem> Search<'a, P> {
         self.descend(options, now, patience)
     }
 
-    /// Fall of the loss that an undamped step promises.
+    /// Reduction of the loss that the linear model predicts for an undamped step.
     fn promise(&mut self) -> Result<f64, ProblemError> {
         let limits = limits(self.parameters, &self.free);
         let theta = self.free.iter().map(|i| self.theta[*i]).collect();
@@ -293,12 +303,12 @@ impl<'a, P: Problem> Search<'a, P> {
         Ok(step.map_or(0.0, |step| step.worth))
     }
 
-    /// Whether the loss has fallen so far that columns computed at `before` are no longer good.
+    /// Whether the loss has fallen so far since `before` that the nuisance columns are out of date.
     fn gone_far(&self, before: f64) -> bool {
         before - self.normal.loss > MOVED * before
     }
 
-    /// All columns anew.
+    /// Compute all columns at the present point.
     fn refresh(&mut self) -> Result<(), ProblemError> {
         let all: Vec<usize> = (0..self.free.len()).collect();
         let runs = std::mem::take(&mut self.runs);
@@ -313,7 +323,8 @@ impl<'a, P: Problem> Search<'a, P> {
         self.problem.evaluate(theta, &wanted)?.finite()
     }
 
-    /// The present point with columns `slots`; `runs` of an evaluation there.
+    /// Evaluate the present point with the columns `slots`; `runs` are those of an evaluation
+    /// there.
     fn differentiate(&mut self, slots: &[usize], runs: &Runs) -> Result<Evaluation, ProblemError> {
         self.evaluations += 1;
         let wanted = self.numbers(slots);
@@ -321,12 +332,12 @@ impl<'a, P: Problem> Search<'a, P> {
         found.finite()
     }
 
-    /// Numbers of the free parameters `slots`.
+    /// Indices of the free parameters `slots`.
     fn numbers(&self, slots: &[usize]) -> Vec<usize> {
         slots.iter().map(|s| self.free[*s]).collect()
     }
 
-    /// Residuals and columns `slots` at the present point.
+    /// Store residuals and the columns `slots` of the present point.
     fn take(&mut self, evaluation: Evaluation, slots: &[usize]) {
         for (slot, column) in slots.iter().zip(evaluation.columns) {
             self.columns[*slot] = Column::new(column);
@@ -344,7 +355,7 @@ impl<'a, P: Problem> Search<'a, P> {
         self.sum();
     }
 
-    /// Normal equations of the present point, for the search.
+    /// Compute the normal equations of the present point.
     fn sum(&mut self) {
         let mut normal = self.total();
         for (slot, i) in self.free.iter().enumerate() {
@@ -371,7 +382,7 @@ impl<'a, P: Problem> Search<'a, P> {
         normal
     }
 
-    /// All parameters, where the free ones are `free`.
+    /// All parameters, with `free` as the values of the free ones.
     fn all(&self, free: &[f64]) -> Vec<f64> {
         let mut theta = self.theta.clone();
         for (i, x) in self.free.iter().zip(free) {
@@ -403,7 +414,7 @@ impl<'a, P: Problem> Search<'a, P> {
             let g = DVector::from_column_slice(&gram.gradient);
             scatter += &g * g.transpose();
         }
-        // What a prior says is as uncertain as it says.
+        // The scatter of a prior is that of its standard deviation.
         for (slot, i) in self.free.iter().enumerate() {
             if let Some((_, std)) = self.parameters[*i].prior {
                 scatter[(slot, slot)] += std.powi(-2);
@@ -439,11 +450,11 @@ impl<P: Problem> LeastSquares for Search<'_, P> {
         &self.normal
     }
 
-    /// Shapes move by less as the size of their effect grows, and by more as it shrinks.
+    /// Scale the step of a shape down if the size of its effect grows, and up if it shrinks.
     ///
-    /// An effect `a f(s)` changes by `f da + a f' ds`, which a step of `ds a / (a + da)` from the new
-    /// size still makes: a valley along which size and shape make up for each other is followed
-    /// straight on, which would be crept along otherwise.
+    /// An effect `a f(s)` changes by `f da + a f' ds`. At the new size, a step of `ds a / (a + da)`
+    /// gives the same change. The search then follows a curved valley, along which size and shape
+    /// compensate each other, in long steps instead of many short ones.
     fn land(&self, from: &[f64], to: &mut [f64]) {
         for slot in 0..to.len() {
             let amplitude = self.parameters[self.free[slot]].amplitude;
@@ -472,7 +483,8 @@ impl<P: Problem> LeastSquares for Search<'_, P> {
                 Ok(Some((loss + self.prior_loss(&theta), trial)))
             }
             Err(ProblemError::Cancelled) => Err(ProblemError::Cancelled),
-            // Misuse has shown at the start: what fails here does so by its parameters.
+            // Invalid input has been reported at the start, so an error here is due to the
+            // parameters.
             Err(_) => Ok(None),
         }
     }

@@ -1,17 +1,17 @@
-//! Normal equations kept apart by block of data.
+//! Normal equations, separately for each block of data.
 //!
-//! A block is a stretch of one axis of one log. With the pieces of
-//! `J^T J`, `J^T r` and `r^T r` per block, cross-validation, bootstrap and
-//! sandwich covariance need no further simulation and no stored residuals.
+//! A block is a section of one axis of one log. With `J^T J`, `J^T r` and `r^T r` of each block,
+//! cross-validation, bootstrap and sandwich covariance need no further simulation and no stored
+//! residuals.
 
 use axisight_numerics::Weighting;
 
-/// Where a block lies in the residual vector.
+/// Place of a block in the residual vector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Block {
-    /// Log number.
+    /// Index of the log.
     pub record: usize,
-    /// Axis number.
+    /// Index of the axis.
     pub axis: usize,
     /// First entry in the residual vector.
     pub start: usize,
@@ -19,7 +19,7 @@ pub struct Block {
     pub len: usize,
 }
 
-/// Normal equations of one block; parameters in the order of the fit.
+/// Normal equations of one block, with the parameters in the order of the fit.
 #[derive(Debug, Clone)]
 pub struct BlockGram {
     /// The block.
@@ -28,11 +28,11 @@ pub struct BlockGram {
     pub matrix: Vec<f64>,
     /// `J^T W r`.
     pub gradient: Vec<f64>,
-    /// Sum of losses.
+    /// Loss of the block.
     pub loss: f64,
 }
 
-/// The blocks of logs of `lengths` samples, cut into about `block_s` seconds; log, axis, time.
+/// Blocks of about `block_s` seconds for logs of `lengths` samples, ordered by log, axis and time.
 pub(super) fn blocks(
     lengths: impl Iterator<Item = usize>,
     weighting: &[Weighting],
@@ -45,7 +45,7 @@ pub(super) fn blocks(
         for (axis, weighting) in weighting.iter().enumerate() {
             let len = weighting.output_len(n_samples);
             let step = sample_time * weighting.decimation as f64;
-            // Truncation is fine: block lengths are approximate.
+            // Truncation is acceptable, because block lengths are approximate.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             let block_len = (block_s / step) as usize;
             out.extend(cut(record, axis, start, len, block_len));
@@ -85,7 +85,7 @@ impl BlockGram {
         let n = columns.len();
         let mut matrix = vec![0.0; n * n];
         let mut gradient = vec![0.0; n];
-        // Most effects act on one axis and leave the blocks of the others alone.
+        // Most effects act on one axis and have zero columns in the blocks of other axes.
         let acting: Vec<(usize, &[f64])> = columns
             .iter()
             .map(|c| &c[range.clone()])
@@ -110,7 +110,8 @@ impl BlockGram {
     }
 }
 
-/// Inner product with eight partial sums, which vectorises and rounds less.
+/// Inner product with eight partial sums, which becomes vector code and has smaller rounding
+/// errors.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (chunks_a, chunks_b) = (a.chunks_exact(8), b.chunks_exact(8));

@@ -1,8 +1,7 @@
 //! Inverse-dynamics error: torque predicted from a measured motion.
 //!
-//! Gears count as rigid (`q = r phi`) and elastic joints as standing still, so
-//! the prediction holds below the first resonance; effects of the transmission
-//! and the sensor have no place in it.
+//! Gears count as rigid (`q = r phi`) and elastic joints as standing still, so the prediction is
+//! valid below the first resonance. Effects of the transmission and the sensor cannot be included.
 
 use super::gram::{Block, blocks};
 use super::lateness::commanded;
@@ -17,10 +16,10 @@ use axisight_scalar::{Dual, Scalar};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Derivatives per pass.
+/// Number of derivatives per pass.
 const SEEDS: usize = 8;
 
-/// A measured motion; arrays are row-major `(n_samples, n_axes)`, motor side.
+/// A measured motion. Arrays are row-major `(n_samples, n_axes)`, motor side.
 #[derive(Debug, Clone)]
 pub struct MotionRecord {
     /// Motor position [rad].
@@ -31,7 +30,8 @@ pub struct MotionRecord {
     pub acceleration: Vec<f64>,
     /// Motor torque [Nm].
     pub torque: Vec<f64>,
-    /// Factor on the weighted error of each sample, from 0 to 1: how far a torque can be predicted there.
+    /// Factor on the weighted error of each sample, from 0 to 1: how well the torque can be
+    /// predicted there.
     pub certainty: Vec<f64>,
 }
 
@@ -40,7 +40,7 @@ pub struct MotionRecord {
 pub struct InverseDynamics {
     /// The robot.
     pub robot: RobotDescription,
-    /// Effects in the model.
+    /// Effects of the model.
     pub effects: Vec<EffectSetting<f64>>,
     /// Parameters, in the order of `theta`.
     pub parameters: Vec<FitParameter>,
@@ -53,10 +53,10 @@ pub struct InverseDynamics {
 }
 
 impl InverseDynamics {
-    /// Check shapes.
+    /// Check the shapes of all arrays.
     ///
     /// # Errors
-    /// [`ProblemError::Invalid`] naming the field.
+    /// [`ProblemError::Invalid`] that names the invalid field.
     pub fn validate(&self) -> Result<(), ProblemError> {
         let n_axes = self.robot.n_axes();
         check_logs(self.records.len(), &self.weighting, n_axes)?;
@@ -90,10 +90,10 @@ impl InverseDynamics {
         Ok(())
     }
 
-    /// The same of some motions, by their numbers.
+    /// The same problem with some of the motions, by their indices.
     ///
     /// # Errors
-    /// [`ProblemError::Invalid`] for a motion that is not there.
+    /// [`ProblemError::Invalid`] if `logs` is empty or an index does not exist.
     pub fn part(&self, logs: &[usize]) -> Result<Self, ProblemError> {
         let records = picked(&self.records, logs)?;
         Ok(Self {
@@ -105,7 +105,7 @@ impl InverseDynamics {
     /// The same motions with other factors on the errors of their samples.
     ///
     /// # Errors
-    /// [`ProblemError::Invalid`] for another number of motions, or factors that do not suit them.
+    /// [`ProblemError::Invalid`] if there is not one array per motion, or the factors are invalid.
     pub fn with_certainty(&self, certainty: Vec<Vec<f64>>) -> Result<Self, ProblemError> {
         if certainty.len() != self.records.len() {
             let expected = format!("one array for each of {} motions", self.records.len());
@@ -127,9 +127,9 @@ impl InverseDynamics {
         Ok(found)
     }
 
-    /// Predicted torque of one record: `[quantity][axis][sample]`, value first.
+    /// Predicted torque of one record, `[quantity][axis][sample]`, with the value first.
     ///
-    /// Where no seed is in the arm, its dynamics (most of the work) are those of plain numbers.
+    /// If no seed is in the arm, its dynamics, which are most of the work, use plain numbers.
     fn predict<S: Scalar>(
         &self,
         record: &MotionRecord,
@@ -148,7 +148,7 @@ impl InverseDynamics {
         Ok(self.predicted(&plant, record, seeds.len(), &mut Arm::new(&plain)))
     }
 
-    /// Torque of `plant` along a record, `[quantity][axis][sample]`, value first.
+    /// Torque of `plant` along a record, `[quantity][axis][sample]`, with the value first.
     fn predicted<S: Scalar, T: Scalar>(
         &self,
         plant: &Plant<S>,
@@ -182,7 +182,7 @@ impl InverseDynamics {
         out
     }
 
-    /// Whitened residual and derivative series of one record, axes in a row.
+    /// Whitened series of residuals and derivatives of one record, axis after axis.
     fn pass(
         &self,
         record: &MotionRecord,
@@ -203,7 +203,7 @@ impl InverseDynamics {
         let mut out = vec![Vec::new(); series.len()];
         for (axis, weighting) in self.weighting.iter().enumerate() {
             let plan = weighting.plan(n_samples, self.robot.sample_time);
-            // What does not depend on a seed needs no filter; the rest goes two at a time.
+            // Series of zeros need no filter. All others are filtered in pairs.
             let acting: Vec<usize> = (0..series.len())
                 .filter(|i| series[*i][axis].iter().any(|x| *x != 0.0))
                 .collect();
@@ -231,7 +231,7 @@ impl InverseDynamics {
     }
 }
 
-/// The arm along a motion: forces on its driven joints, without effects.
+/// The arm along a motion, which gives the forces on its driven joints without effects.
 struct Arm<'a, S: Scalar> {
     plant: &'a Plant<S>,
     scratch: DynamicsScratch<S>,
@@ -270,7 +270,7 @@ impl<'a, S: Scalar> Arm<'a, S> {
     }
 }
 
-/// Torque that a motor gives to gears it turns along [Nm].
+/// Torque of a motor on the other gears that it turns [Nm].
 fn reaction<S: Scalar, T: Scalar>(plant: &Plant<S>, forces: &[T], motor: usize) -> S {
     let mut torque = S::zero();
     for axis in &plant.axes {
@@ -281,7 +281,7 @@ fn reaction<S: Scalar, T: Scalar>(plant: &Plant<S>, forces: &[T], motor: usize) 
     torque
 }
 
-/// Torque that a motor gives to effects between axes in sample `k` [Nm].
+/// Torque of a motor for effects between axes in sample `k` [Nm].
 fn coupled<S: Scalar>(plant: &Plant<S>, record: &MotionRecord, k: usize, motor: usize) -> S {
     let first = k * plant.axes.len();
     let state = |i: usize| {
@@ -305,7 +305,7 @@ fn coupled<S: Scalar>(plant: &Plant<S>, record: &MotionRecord, k: usize, motor: 
     torque
 }
 
-/// The same number over another scalar; derivatives go along where there are any.
+/// A number over another scalar, with its derivatives if it has any.
 fn lifted<T: Scalar, S: Scalar>(x: &T) -> S {
     (0..T::PARTIALS).fold(S::constant(x.lane(0)), |sum, seed| {
         let slope = x.partial(seed, 0);
@@ -313,8 +313,10 @@ fn lifted<T: Scalar, S: Scalar>(x: &T) -> S {
     })
 }
 
-/// Torque commanded in an entry of a record, by place and time, where the arm asks for `force` on the joint and
-/// other axes for `turned` on the motor.
+/// Commanded torque at entry `i` of a record and the time `time`.
+///
+/// `force` is the force that the arm needs on the joint, `turned` the torque that other axes need
+/// on the motor.
 fn drive<S: Scalar>(
     axis: &Axis<S>,
     record: &MotionRecord,

@@ -1,13 +1,14 @@
-//! Commands that drives carry out late: of a torque that acted, what was asked for.
+//! Inverse of delays and lags in the torque path: the commanded torque for an applied torque.
 //!
-//! The inverse of a delay is what comes later; that of a lag of first or second order is a sum of derivatives.
-//! Both along series of samples, with the derivatives of seeds.
+//! The inverse of a delay takes later samples. The inverse of a lag of first or second order is a
+//! sum of derivatives. Both act on series of samples, with derivatives along seeds.
 
 use axisight_core::effects::Kernel;
 use axisight_scalar::Scalar;
 use std::sync::Arc;
 
-/// Turn the torque of one axis, value first and then one series a seed, into what was commanded for it.
+/// Convert applied to commanded torque of one axis; `series` holds the value, then one series per
+/// seed.
 pub(super) fn commanded<S: Scalar>(
     kernels: &[Arc<dyn Kernel<S>>],
     step: f64,
@@ -29,13 +30,13 @@ pub(super) fn commanded<S: Scalar>(
     series
 }
 
-/// Series that come a number of samples earlier; the last value holds on.
+/// Series shifted to earlier times by `samples`. The last value is held.
 fn earlier<S: Scalar>(series: &[Vec<f64>], samples: S) -> Vec<Vec<f64>> {
     let shifted: Vec<Vec<f64>> = series.iter().map(|x| between(x, samples.lane(0))).collect();
     with_partials(&shifted, &[(samples, slope(&shifted[0]))])
 }
 
-/// Series plus their first and second derivatives by samples, times a factor each.
+/// Series plus `first` times their first and `second` times their second derivatives over samples.
 fn unfiltered<S: Scalar>(series: &[Vec<f64>], first: S, second: S) -> Vec<Vec<f64>> {
     let mut out = Vec::with_capacity(series.len());
     for x in series {
@@ -50,7 +51,7 @@ fn unfiltered<S: Scalar>(series: &[Vec<f64>], first: S, second: S) -> Vec<Vec<f6
     with_partials(&out, &[(first, rate), (second, curve)])
 }
 
-/// Series with what their value changes by where factors of `terms` carry derivatives.
+/// Add the derivatives of the factors in `terms` to the derivative series.
 fn with_partials<S: Scalar>(series: &[Vec<f64>], terms: &[(S, Vec<f64>)]) -> Vec<Vec<f64>> {
     let mut out = series.to_vec();
     for (seed, target) in out[1..].iter_mut().enumerate() {
@@ -67,12 +68,13 @@ fn with_partials<S: Scalar>(series: &[Vec<f64>], terms: &[(S, Vec<f64>)]) -> Vec
     out
 }
 
-/// A series that comes `samples` earlier, on cubics through its samples (Catmull and Rom, 1974).
+/// A series shifted to earlier times by `samples`, with cubics through its samples (Catmull and
+/// Rom, 1974).
 fn between(x: &[f64], samples: f64) -> Vec<f64> {
     let n = x.len();
     let part = samples - samples.floor();
     let skipped = (0..n).take_while(|k| (*k as f64) < samples.floor()).count();
-    // The first value before a series, the last behind it.
+    // Before the series the first value is held, after it the last.
     let at = |k: usize| x[k.saturating_sub(1).min(n - 1)];
     (0..n)
         .map(|k| {
@@ -86,7 +88,7 @@ fn between(x: &[f64], samples: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Derivative by samples: central differences, one-sided at the ends.
+/// Derivative over samples: central differences, one-sided at the ends.
 fn slope(x: &[f64]) -> Vec<f64> {
     let last = x.len() - 1;
     (0..=last)
@@ -118,7 +120,7 @@ mod tests {
 
     #[test]
     fn what_is_asked_for_late_was_asked_for_earlier() {
-        // A cubic through samples of a sine is off by w^4 / 128 at most.
+        // The error of a cubic through samples of a sine is at most w^4 / 128.
         for late in [0.0, 0.3, 1.0, 2.75] {
             let found = earlier::<f64>(&[wave(0.0)], late);
             assert!(off(&found[0], &wave(late)) < 0.05_f64.powi(3) / 20.0);
@@ -127,7 +129,8 @@ mod tests {
 
     #[test]
     fn a_lag_is_undone_by_its_derivatives() {
-        // Of sin: plus first w cos, less second w^2 sin; central differences are off by a sixth of w^2.
+        // For sin: plus first w cos, minus second w^2 sin. Central differences have an error of a
+        // sixth of w^2.
         let (first, second) = (3.0, 4.0);
         let found = unfiltered::<f64>(&[wave(0.0)], first, second);
         let cosine: Vec<f64> = (0..200).map(|k| (0.05 * f64::from(k)).cos()).collect();

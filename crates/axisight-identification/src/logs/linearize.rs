@@ -1,7 +1,7 @@
-//! Residuals and Jacobian at one point, and the normal equations they sum to by block.
+//! Residuals and Jacobian at one point, and their normal equations by block.
 //!
-//! A prediction, the promise of a candidate, the information of an experiment: whatever needs
-//! a model at given parameters and no search.
+//! It serves all uses of a model at given parameters without a search: a prediction, the predicted
+//! gain of a candidate, the information of an experiment.
 
 use super::gram::BlockGram;
 use super::loss::Loss;
@@ -13,35 +13,36 @@ use std::sync::Arc;
 /// A column of a Jacobian, shared by the fits that use it.
 pub type Column = Arc<Vec<f64>>;
 
-/// A problem at one point.
+/// A problem, linearized at one point.
 #[derive(Debug, Clone)]
 pub struct Linearization {
     /// All parameters.
     pub theta: Vec<f64>,
-    /// Numbers of the parameters that are not frozen, the order of what follows.
+    /// Indices of the parameters that are not frozen, in the order of the fields below.
     pub free: Vec<usize>,
-    /// Free parameters that lie on a bound.
+    /// Indices of the free parameters on a bound.
     pub at_bound: Vec<usize>,
-    /// Loss of the residuals, priors excluded.
+    /// Loss of the residuals, without the priors.
     pub loss: f64,
     /// Whitened residuals.
     pub residual: Vec<f64>,
     /// Jacobian columns of the free parameters.
     pub columns: Vec<Column>,
-    /// Normal equations by block.
+    /// Normal equations of each block.
     pub blocks: Vec<BlockGram>,
 }
 
-/// Mean square of a whitened residual that no natural change of a parameter causes: a
-/// thousand standard deviations of noise.
+/// Largest plausible mean square of the change of whitened residuals for a natural change of a
+/// parameter: a thousand standard deviations of noise.
 const LARGEST_SQUARE: f64 = 1e6;
 
 impl Linearization {
-    /// `problem` at the initial values of `parameters`. Columns of parameters in `warm`, pairs
-    /// of parameter number and column, are taken from there and not computed.
+    /// Linearize `problem` at the initial values of `parameters`.
+    ///
+    /// `warm` holds pairs of parameter index and column. These columns are used and not computed.
     ///
     /// # Errors
-    /// [`ProblemError`] for misuse or where the model does not hold.
+    /// [`ProblemError`] if the input is invalid or the model has no valid run.
     pub fn new<P: Problem>(
         problem: &P,
         parameters: &[FitParameter],
@@ -104,7 +105,7 @@ fn check(parameters: &[FitParameter]) -> Result<(), ProblemError> {
     Ok(())
 }
 
-/// How far the parameters `free` may go.
+/// Bounds and scales of the parameters `free`.
 pub(super) fn limits(parameters: &[FitParameter], free: &[usize]) -> Limits {
     let each = |of: fn(&FitParameter) -> f64| free.iter().map(|i| of(&parameters[*i])).collect();
     Limits {
@@ -115,14 +116,14 @@ pub(super) fn limits(parameters: &[FitParameter], free: &[usize]) -> Limits {
     }
 }
 
-/// Which of the parameters `free` lie on a bound.
+/// Those of the parameters `free` that lie on a bound.
 pub(super) fn at_bound(parameters: &[FitParameter], free: &[usize], theta: &[f64]) -> Vec<usize> {
     let values: Vec<f64> = free.iter().map(|i| theta[*i]).collect();
     let slots = limits(parameters, free).at_bound(&values);
     slots.into_iter().map(|slot| free[slot]).collect()
 }
 
-/// Sum of losses, and the normal equations of every block.
+/// The loss, and the normal equations of every block.
 pub(super) fn grams<P: Problem>(
     problem: &P,
     parameters: &[FitParameter],
@@ -148,9 +149,10 @@ pub(super) fn grams<P: Problem>(
     (losses.iter().sum(), blocks.collect())
 }
 
-/// Whether a parameter's natural change moves this block beyond all reason: the
-/// simulation is chaotic there (lost motion, stiction). Such a block counts in the
-/// loss, but its derivative says nothing about a finite change.
+/// Whether a natural change of a parameter changes a block implausibly much.
+///
+/// The simulation is then chaotic (lost motion, stiction). Such a block counts in the loss, but its
+/// derivatives do not describe a finite change.
 fn unpredictable(gram: &BlockGram, scale: &[f64]) -> bool {
     let n = scale.len();
     scale.iter().enumerate().any(|(slot, scale)| {

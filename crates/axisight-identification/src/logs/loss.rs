@@ -5,9 +5,9 @@
 pub enum Loss {
     /// Least squares.
     Squared,
-    /// Quadratic up to the scale, linear beyond (Huber 1964).
+    /// Quadratic up to the given scale, linear above it (Huber 1964).
     Huber(f64),
-    /// `2 c^2 (sqrt(1 + (r/c)^2) - 1)`, a smooth Huber loss.
+    /// `2 c^2 (sqrt(1 + (r/c)^2) - 1)` with the scale `c`, a smooth Huber loss.
     SoftL1(f64),
 }
 

@@ -1,4 +1,4 @@
-//! Fitting: residuals of several logs, exact sensitivities, the search for their least squares.
+//! Fits to logs: residuals of several logs, exact sensitivities, and their least squares.
 
 mod courses;
 mod divergence;

@@ -1,18 +1,18 @@
-//! Logs in the lanes of a simulation, and derivatives in the lanes that logs leave.
+//! Packing of logs, and of derivatives, into the lanes of a simulation.
 //!
-//! Fewer logs than lanes run in several copies, each with derivatives by other parameters: two
-//! logs in four lanes carry eight of them in the time of four. Lanes do not feel one another: every
-//! number is the one that it would be alone, but for rounding.
+//! If there are fewer logs than lanes, the logs run in several copies, each with derivatives along
+//! other parameters. Two logs in four lanes compute eight derivatives in the time of four. Lanes do
+//! not affect each other, so every number is the same as in a separate run, up to rounding.
 
 use axisight_scalar::Scalar;
 use std::ops::Range;
 
-/// Runs in lock-step.
+/// Number of runs in lock-step.
 pub(super) const LANES: usize = 4;
-/// Most derivatives of one run in a pass.
+/// Largest number of derivatives of one run in a pass.
 pub(super) const PARTIALS: usize = 4;
 
-/// How many logs share the lanes of a simulation, and in how many copies.
+/// Number of logs in the lanes of a simulation, and of their copies.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Packing {
     logs: usize,
@@ -20,7 +20,7 @@ pub(super) struct Packing {
 }
 
 impl Packing {
-    /// Of `logs` logs, one to as many as there are lanes.
+    /// The packing of `logs` logs, from one log to one log per lane.
     pub(super) fn of(logs: usize) -> Self {
         let logs = logs.clamp(1, LANES);
         Self {
@@ -29,36 +29,37 @@ impl Packing {
         }
     }
 
-    /// The logs lane by lane.
+    /// The log of each lane.
     pub(super) fn fill(&self, logs: &[usize]) -> Vec<usize> {
         logs.repeat(self.copies)
     }
 
-    /// Ranges of `columns` derivatives by pass; one empty range for none.
+    /// Range of the derivatives in each pass, for `columns` derivatives. There is one empty range
+    /// if there are none.
     pub(super) fn passes(&self, columns: usize) -> impl Iterator<Item = Range<usize>> + use<> {
         let most = self.copies * PARTIALS;
         (0..columns.div_ceil(most).max(1)).map(move |i| i * most..((i + 1) * most).min(columns))
     }
 
-    /// Derivatives that each run carries, where a pass has `seeds` in all.
+    /// Number of derivatives of each run in a pass with `seeds` derivatives.
     pub(super) fn partials(&self, seeds: usize) -> usize {
         seeds.div_ceil(self.copies)
     }
 
-    /// `number` with slope one by `seed`, in the copy that carries it.
+    /// `number` with slope one along `seed`, in the copy that has this seed.
     pub(super) fn seeded<S: Scalar>(&self, number: S, seed: usize) -> S {
         let (copy, partial) = Self::place::<S>(seed);
         let here = S::from_lanes(|lane| f64::from(lane / self.logs == copy));
         number + S::zero().seeded(partial) * here
     }
 
-    /// Slope of `y` by `seed` for a log.
+    /// Slope of `y` along `seed` for a log.
     pub(super) fn slope<S: Scalar>(&self, y: &S, seed: usize, log: usize) -> f64 {
         let (copy, partial) = Self::place::<S>(seed);
         y.partial(partial, copy * self.logs + log)
     }
 
-    /// Copy and partial that carry a seed.
+    /// Copy and partial derivative that belong to a seed.
     fn place<S: Scalar>(seed: usize) -> (usize, usize) {
         let each = S::PARTIALS.max(1);
         (seed / each, seed % each)

@@ -1,4 +1,4 @@
-//! What a fit needs to know of a problem.
+//! The interface between a fit and a problem.
 
 use super::courses::Runs;
 use super::divergence::Divergence;
@@ -8,52 +8,53 @@ use axisight_numerics::Weighting;
 use axisight_scalar::Scalar;
 use std::sync::Arc;
 
-/// What a fitted number is.
+/// The quantity that a fitted number stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Target {
     /// A parameter of the robot.
     Robot(Parameter),
-    /// A parameter of an effect: position in the list of effects, then in its table.
+    /// A parameter of an effect: index in the list of effects, then in the table of the effect.
     Effect(usize, usize),
 }
 
-/// One number to fit.
+/// One parameter to fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitParameter {
-    /// What it is.
+    /// The quantity.
     pub target: Target,
-    /// Where the search starts.
+    /// Start value of the search.
     pub initial: f64,
     /// Lower bound.
     pub lower: f64,
     /// Upper bound.
     pub upper: f64,
-    /// Natural size of a change; makes parameters of any unit comparable.
+    /// Natural size of a change, which makes parameters of all units comparable.
     pub scale: f64,
-    /// Mean and standard deviation of what is known beforehand.
+    /// Prior mean and standard deviation.
     pub prior: Option<(f64, f64)>,
-    /// Kept at its initial value.
+    /// Whether the parameter stays at its initial value.
     pub frozen: bool,
-    /// Of a shape: the parameter that is the only size of its effect.
+    /// For a shape: index of the only size parameter of its effect.
     pub amplitude: Option<usize>,
-    /// Its sensitivity changes little: computed once, or taken from an earlier fit,
-    /// and refreshed only when asked for.
+    /// Whether its sensitivity changes little. Its column is then computed once, or taken from an
+    /// earlier fit, and renewed only on request.
     pub nuisance: bool,
 }
 
-/// Residuals and some columns of their Jacobian.
+/// Residuals with some columns of their Jacobian.
 #[derive(Debug, Clone)]
 pub struct Evaluation {
     /// Whitened residuals, model minus measurement.
     pub residual: Vec<f64>,
     /// Derivatives of the residuals, one vector per requested parameter.
     pub columns: Vec<Vec<f64>>,
-    /// Runs that further derivatives at the same point can be taken along; of some problems.
+    /// Runs along which more derivatives at the same point can be computed; empty for some
+    /// problems.
     pub(super) runs: Runs,
 }
 
 impl Evaluation {
-    /// Residuals and columns of a problem without runs.
+    /// Residuals and columns, for a problem without runs.
     pub fn new(residual: Vec<f64>, columns: Vec<Vec<f64>>) -> Self {
         Self {
             residual,
@@ -62,7 +63,7 @@ impl Evaluation {
         }
     }
 
-    /// Itself, if all residuals are finite.
+    /// Returns itself if all residuals are finite, otherwise an error.
     pub(super) fn finite(self) -> Result<Self, ProblemError> {
         if self.residual.iter().all(|r| r.is_finite()) {
             Ok(self)
@@ -72,26 +73,26 @@ impl Evaluation {
     }
 }
 
-/// Why a problem cannot be evaluated.
+/// Reason why a problem cannot be evaluated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProblemError {
-    /// The model does not hold at these parameters (unstable, too stiff, no equilibrium): no misuse.
+    /// The model has no valid run at these parameters (unstable, too stiff, no equilibrium).
     #[error(transparent)]
     Diverged(Divergence),
-    /// Another thread asked to stop.
+    /// Another thread cancelled the fit.
     #[error("cancelled")]
     Cancelled,
-    /// Misuse that building or running the model shows.
+    /// Invalid input that shows when the model is built or run.
     #[error("{0}")]
     Misuse(String),
-    /// Misuse, also at the first evaluation.
+    /// Invalid input, reported at the first evaluation at the latest.
     #[error("{field}: expected {expected}, got {got}")]
     Invalid {
-        /// Argument.
+        /// Name of the argument.
         field: String,
-        /// What it should be.
+        /// Expected value.
         expected: String,
-        /// What came.
+        /// Actual value.
         got: String,
     },
 }
@@ -104,7 +105,7 @@ pub(super) fn invalid(field: String, expected: String, got: String) -> ProblemEr
     }
 }
 
-/// Refuse a problem without logs, or whose weighting does not suit its axes.
+/// Refuse a problem without logs, or with a weighting that does not fit its axes.
 pub(super) fn check_logs(
     n_logs: usize,
     weighting: &[Weighting],
@@ -126,7 +127,7 @@ pub(super) fn check_logs(
     Ok(())
 }
 
-/// Some of the logs of a problem, by their numbers.
+/// Some of the logs of a problem, by their indices; an error if an index does not exist.
 pub(super) fn picked<T>(records: &[Arc<T>], logs: &[usize]) -> Result<Vec<Arc<T>>, ProblemError> {
     let one = |i: &usize| {
         let found = records.get(*i).map(Arc::clone);
@@ -147,12 +148,13 @@ pub trait Problem: Sync {
     /// Residuals at `theta` and their derivatives with respect to the parameters `columns`.
     ///
     /// # Errors
-    /// [`ProblemError::Diverged`] where the model does not hold.
+    /// [`ProblemError::Diverged`] if the model has no valid run at `theta`.
     fn evaluate(&self, theta: &[f64], columns: &[usize]) -> Result<Evaluation, ProblemError>;
-    /// The same where an evaluation at `theta` is known, whose `runs` may save a simulation.
+    /// The same as [`Problem::evaluate`], with the `runs` of an earlier evaluation at `theta`,
+    /// which may save a simulation.
     ///
     /// # Errors
-    /// [`ProblemError::Diverged`] where the model does not hold.
+    /// [`ProblemError::Diverged`] if the model has no valid run at `theta`.
     fn differentiate(
         &self,
         theta: &[f64],
@@ -162,12 +164,12 @@ pub trait Problem: Sync {
         let _ = runs;
         self.evaluate(theta, columns)
     }
-    /// How the residual vector is cut into blocks.
+    /// The blocks of the residual vector.
     fn blocks(&self) -> Vec<Block>;
 }
 
-/// Parameters of a plant at `theta`, those in `seeds` carrying derivatives: `seed` gives one its
-/// slope, by its place there.
+/// Parameters of a plant at `theta`; `seed` adds derivatives to those in `seeds`, by their position
+/// there.
 pub(super) fn seeded<S: Scalar>(
     parameters: &[FitParameter],
     effects: &[EffectSetting<f64>],

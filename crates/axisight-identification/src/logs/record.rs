@@ -2,26 +2,27 @@
 
 use super::problem::{ProblemError, invalid};
 
-/// One log to be reproduced; arrays are row-major `(n_samples, n_axes)`.
+/// One log to be reproduced. Arrays are row-major `(n_samples, n_axes)`.
 #[derive(Debug, Clone)]
 pub struct Record {
-    /// Velocity reference [rad/s], commanded torque [Nm] or, when tracking, measured
-    /// position [rad], as the problem's input asks.
+    /// Input of the simulation: velocity reference [rad/s], commanded torque [Nm] or, for tracking,
+    /// measured position [rad].
     pub input: Vec<f64>,
-    /// Commanded torque [Nm] or measured position [rad], as the problem's output asks.
+    /// Compared output: commanded torque [Nm] or measured position [rad].
     pub target: Vec<f64>,
-    /// Factor on the weighted error of each sample, from 0 to 1: how far a model can be asked to
-    /// follow there. `None`: one everywhere.
+    /// Factor on the weighted error of each sample, from 0 to 1: how well a model can follow the
+    /// log there. `None` means one everywhere.
     pub certainty: Option<Vec<f64>>,
-    /// Driven joint angles where the run begins, at rest [rad]. `None`: the operating point.
+    /// Driven joint angles at the start of the run, at rest [rad]. `None` means the operating
+    /// point.
     pub start: Option<Vec<f64>>,
-    /// Samples at the beginning of input and target that are simulated and not compared: how a run
-    /// comes into the motion that its log begins with. `certainty` has none of them.
+    /// Number of samples of the run-up at the beginning of input and target. They are simulated but
+    /// not compared, and `certainty` does not include them.
     pub lead: usize,
 }
 
 impl Record {
-    /// A log that counts everywhere and begins at the operating point.
+    /// A log with a certainty of one that begins at the operating point.
     pub fn new(input: Vec<f64>, target: Vec<f64>) -> Self {
         Self {
             input,
@@ -32,7 +33,7 @@ impl Record {
         }
     }
 
-    /// The first `n_samples` that are compared, and what leads to them, of `n_axes` axes.
+    /// The run-up and the first `n_samples` compared samples, for `n_axes` axes.
     pub(super) fn first(&self, n_samples: usize, n_axes: usize) -> Self {
         let kept = (self.lead + n_samples) * n_axes;
         let certainty = self.certainty.as_ref();
@@ -45,7 +46,7 @@ impl Record {
         }
     }
 
-    /// Refuse arrays that do not suit `n_axes` axes; `number` is the log's among others.
+    /// Refuse arrays that do not fit `n_axes` axes; `number` is the index of the log in the error.
     pub(super) fn validate(&self, number: usize, n_axes: usize) -> Result<(), ProblemError> {
         let field = format!("records[{number}]");
         let (n, m) = (self.input.len(), self.target.len());

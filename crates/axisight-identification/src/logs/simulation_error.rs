@@ -1,11 +1,14 @@
-//! Simulation error: logs against a free-running simulation of the loop.
+//! Simulation error: logs compared with a free simulation of the closed loop.
 //!
-//! All logs run in lock-step in the lanes of one simulation; derivatives ride along as dual
-//! numbers, a few parameters per pass ([`super::packing`]). The residual comes from the model itself;
-//! for derivatives the arm is linearised along that run ([`axisight_core::robot::Course`]), and
-//! for both when runs of a model nearby are given ([`Courses`]). A pass with `d` derivatives
-//! over `n` samples takes about `4 n (1 + 2 d)` right-hand sides for a batch of logs, of which
-//! the linearised arm leaves a sixth.
+//! All logs run in lock-step in the lanes of one simulation. Derivatives are dual numbers, with a
+//! few parameters per pass ([`super::packing`]).
+//!
+//! The residual comes from the model itself. For derivatives, the arm is linearised along that run
+//! ([`axisight_core::robot::Course`]). If runs of a similar model are given ([`Courses`]), both use
+//! the arm linearised along those runs.
+//!
+//! A pass with `d` derivatives over `n` samples takes about `4 n (1 + 2 d)` right-hand sides for a
+//! batch of logs. The linearised arm leaves a sixth of this.
 
 use super::courses::{Batch, Courses, OwnRun, Runs};
 use super::gram::{Block, blocks};
@@ -23,19 +26,19 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// What drives the simulation.
+/// The input of the simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SimulationInput {
     /// Velocity references, through the controller.
     Reference,
     /// Commanded torques, in open loop.
     Torque,
-    /// The logged torques (the targets), with feedback to the logged positions (the inputs):
-    /// the residual is the torque the feedback has to add.
+    /// Logged torques (the targets), with feedback to the logged positions (the inputs). The
+    /// residual is the torque that the feedback adds.
     Tracking,
 }
 
-/// What is compared.
+/// The compared output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SimulationOutput {
     /// Commanded torque.
@@ -49,7 +52,7 @@ pub enum SimulationOutput {
 pub struct SimulationErrorProblem {
     /// The robot.
     pub robot: RobotDescription,
-    /// Effects in the model, at the values parameters do not replace.
+    /// Effects of the model. Parameters replace some of their values.
     pub effects: Vec<EffectSetting<f64>>,
     /// Parameters, in the order of `theta`.
     pub parameters: Vec<FitParameter>,
@@ -57,7 +60,7 @@ pub struct SimulationErrorProblem {
     pub records: Vec<Arc<Record>>,
     /// Input of the simulation.
     pub input: SimulationInput,
-    /// Output compared.
+    /// Compared output.
     pub output: SimulationOutput,
     /// One weighting per axis.
     pub weighting: Vec<Weighting>,
@@ -65,37 +68,38 @@ pub struct SimulationErrorProblem {
     pub method: Method,
     /// Length of a block [s].
     pub block_s: f64,
-    /// Runs of a model nearby, along which the arm is linearised.
+    /// Runs of a similar model, along which the arm is linearised.
     pub courses: Option<Arc<Courses>>,
-    /// Set by another thread to give the fit up.
+    /// Flag by which another thread cancels the fit.
     pub cancel: Option<Arc<AtomicBool>>,
 }
 
-/// A run that the arm is linearised along.
+/// A run along which the arm is linearised.
 pub(super) type SharedCourse = Arc<Course<Lanes<LANES>>>;
 
-/// Is shown every state of a run.
+/// A function that receives every state of a run.
 type Keep<'a, S> = &'a mut dyn FnMut(&[S]);
 
-/// Series per lane and axis, value and derivatives: `[quantity][lane * axes + axis][sample]`.
+/// Series for each lane and axis, value first, then derivatives:
+/// `[quantity][lane * axes + axis][sample]`.
 pub(super) type Traces = Vec<Vec<Vec<f64>>>;
 
-/// The arm in a run.
+/// The arm of a run.
 pub(super) enum Arm<'a> {
-    /// As it is.
+    /// With its full equations.
     Exact,
     /// Linearised.
     Along(&'a SharedCourse),
 }
 
-/// From as many derivatives as this, a run of its own to linearise along is worth it.
+/// Smallest number of derivatives for which a run for the linearisation saves time.
 const WORTH_A_COURSE: usize = 3;
 
 impl SimulationErrorProblem {
-    /// Check shapes.
+    /// Check the shapes of all arrays.
     ///
     /// # Errors
-    /// [`ProblemError::Invalid`] naming the field.
+    /// [`ProblemError::Invalid`] that names the invalid field.
     pub fn validate(&self) -> Result<(), ProblemError> {
         let n_axes = self.robot.n_axes();
         check_logs(self.records.len(), &self.weighting, n_axes)?;
@@ -105,10 +109,10 @@ impl SimulationErrorProblem {
         Ok(())
     }
 
-    /// The same of some logs, by their numbers.
+    /// The same problem with some of the logs, by their indices.
     ///
     /// # Errors
-    /// [`ProblemError::Invalid`] for a log that is not there.
+    /// [`ProblemError::Invalid`] if `logs` is empty or an index does not exist.
     pub fn part(&self, logs: &[usize]) -> Result<Self, ProblemError> {
         let records = picked(&self.records, logs)?;
         Ok(Self {
@@ -117,10 +121,11 @@ impl SimulationErrorProblem {
         })
     }
 
-    /// The same of the first `samples` of each log that are compared.
+    /// The same problem with the first `samples` compared samples of each log.
     ///
     /// # Errors
-    /// [`ProblemError::Invalid`] for another number of logs, or more samples than one has.
+    /// [`ProblemError::Invalid`] if there is not one number per log, or if one is zero or above the
+    /// number of samples.
     pub fn first(&self, samples: &[usize]) -> Result<Self, ProblemError> {
         let most: Vec<usize> = (0..self.records.len()).map(|i| self.n_samples(i)).collect();
         let there = |(n, most): (&usize, &usize)| (1..=*most).contains(n);
@@ -138,13 +143,13 @@ impl SimulationErrorProblem {
         })
     }
 
-    /// Samples of a log that are compared.
+    /// Number of compared samples of a log.
     fn n_samples(&self, record: usize) -> usize {
         let record = &self.records[record];
         record.input.len() / self.robot.n_axes() - record.lead
     }
 
-    /// Logs that run in lock-step.
+    /// Batches of logs that run in lock-step.
     pub(super) fn batches(&self) -> Vec<Vec<usize>> {
         let all: Vec<usize> = (0..self.records.len()).collect();
         all.chunks(LANES).map(<[usize]>::to_vec).collect()
@@ -187,7 +192,7 @@ impl SimulationErrorProblem {
         Ok(OwnRun::new(output, plant.chain, time, states))
     }
 
-    /// Model output of the logs `records` with the first `n_seeds` derivatives; `keep` sees
+    /// Model output of the logs `records` with the first `n_seeds` derivatives; `keep` receives
     /// every state.
     fn traces<S: Scalar>(
         &self,
@@ -341,18 +346,18 @@ impl SimulationErrorProblem {
     }
 }
 
-/// One batch of logs as an evaluation goes through it.
+/// How an evaluation simulates one batch of logs.
 enum Prepared<'a> {
-    /// The arm as it is, with and without derivatives.
+    /// With the full equations of the arm, for values and derivatives.
     Exact,
-    /// Along runs of a model nearby.
+    /// Along runs of a similar model.
     Near(&'a Batch),
-    /// Along its own run.
+    /// Along the run of the model itself.
     Own(Arc<OwnRun>),
 }
 
 impl SimulationErrorProblem {
-    /// How each batch is to be evaluated.
+    /// Choose how each batch is simulated.
     fn prepared(
         &self,
         batches: &[Vec<usize>],
@@ -406,7 +411,7 @@ impl SimulationErrorProblem {
         }
     }
 
-    /// Residuals and derivatives, each batch as it is prepared.
+    /// Residuals and derivatives of all batches.
     fn evaluated(
         &self,
         theta: &[f64],

@@ -3,71 +3,71 @@
 use super::{Descent, Normal, Step};
 use nalgebra::{DMatrix, DVector};
 
-/// A sum of squares with its derivatives at the present point.
+/// A sum of squares and its derivatives at the present point.
 ///
-/// Parameters are the free ones, in the order of [`Limits`].
+/// All vectors hold the free parameters, in the order of [`Limits`].
 pub trait LeastSquares {
-    /// What an evaluation leaves for [`LeastSquares::accept`].
+    /// Data of an evaluation that [`LeastSquares::accept`] needs.
     type Trial;
-    /// Why a search cannot go on.
+    /// The reason why a search cannot go on.
     type Error;
     /// Normal equations at the present point.
     fn normal(&self) -> &Normal;
-    /// Where a step `from` the present point that ends at `to` by the linear model had better end.
+    /// Move `to`, the end of a step `from` the present point by the linear model, to a better end.
     fn land(&self, from: &[f64], to: &mut [f64]) {
         let _ = (from, to);
     }
-    /// Loss at `theta`, `None` where the model does not hold. Derivatives may wait until the
-    /// point is accepted.
+    /// Loss at `theta`, or `None` where the model is not valid. Derivatives may be computed later,
+    /// in [`LeastSquares::accept`].
     ///
     /// # Errors
-    /// Ends the search.
+    /// Any error ends the search.
     fn attempt(&mut self, theta: &[f64]) -> Result<Option<(f64, Self::Trial)>, Self::Error>;
-    /// `theta` becomes the present point.
+    /// Make `theta` the present point.
     ///
     /// # Errors
-    /// Ends the search.
+    /// Any error ends the search.
     fn accept(&mut self, theta: &[f64], trial: Self::Trial) -> Result<(), Self::Error>;
-    /// A trial that is given up: its memory may serve again.
+    /// Give up a trial, so that its memory can be reused.
     fn reject(&mut self, trial: Self::Trial) {
         drop(trial);
     }
 }
 
-/// How far parameters may go.
+/// Bounds and scales of the parameters, and the longest step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Limits {
     /// Lower bounds.
     pub lower: Vec<f64>,
     /// Upper bounds.
     pub upper: Vec<f64>,
-    /// Sizes of natural changes.
+    /// Typical changes of the parameters, which serve as their units.
     pub scale: Vec<f64>,
-    /// How far in one step.
+    /// Limit of one step.
     pub reach: Reach,
 }
 
-/// How far one step goes: far from the minimum it may promise nonsense.
+/// Limit of one step, because the linear model fails far from the minimum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reach {
-    /// To the bounds.
+    /// A step may go to the bounds.
     Bounds,
-    /// As many scales; a longer step is shortened as a whole.
+    /// A step may have this many scales. A longer step is shortened as a whole.
     Scales(f64),
-    /// A parameter that cannot be negative changes by this factor at most; what is left near
-    /// zero may go there. Moves are shares of the parameter itself, not of its scale.
+    /// A non-negative parameter changes by at most this factor in one step. A parameter near zero
+    /// may go to zero. Moves are relative to the parameter, not to its scale.
     Factor(f64),
 }
 
-/// Share of its scale below which a parameter is near zero.
+/// A parameter is near zero below this share of its scale.
 const NEAR_ZERO: f64 = 1e-3;
-/// Share of its scale by which a parameter on a bound may be off it.
+/// A parameter counts as on a bound within this share of its scale.
 const ON_BOUND: f64 = 1e-9;
-/// Of the largest slope: one that leads nowhere.
+/// Slopes below this share of the largest slope are neglected.
 const SLIGHT: f64 = 1e-6;
 
 impl Limits {
-    /// Where a step of parameter `i` ends, bounds apart.
+    /// End of a step of parameter `i`, before bounds are applied.
     fn reached(&self, i: usize, from: f64, step: f64) -> f64 {
         let to = from + step;
         match self.reach {
@@ -78,7 +78,7 @@ impl Limits {
         }
     }
 
-    /// Factor by which the whole step is shortened.
+    /// Factor that shortens the whole step.
     fn shortening(&self, step: &DVector<f64>) -> f64 {
         let Reach::Scales(longest) = self.reach else {
             return 1.0;
@@ -92,7 +92,7 @@ impl Limits {
         }
     }
 
-    /// Move of parameter `i` as a share of its size.
+    /// Move of parameter `i` relative to its size.
     fn share(&self, i: usize, from: f64, to: f64) -> f64 {
         let size = match self.reach {
             Reach::Factor(_) => from.abs().max(NEAR_ZERO * self.scale[i]),
@@ -101,7 +101,7 @@ impl Limits {
         (to - from).abs() / size
     }
 
-    /// Parameters of `theta` that lie on a bound.
+    /// Indices of the parameters in `theta` that lie on a bound.
     pub fn at_bound(&self, theta: &[f64]) -> Vec<usize> {
         let near = |i: &usize| {
             let small = ON_BOUND * self.scale[*i];
@@ -113,26 +113,27 @@ impl Limits {
 
 /// Damped Gauss-Newton steps of a problem within its limits.
 ///
-/// Marquardt (1963) with his scaling by the diagonal, which makes the units of the parameters
-/// irrelevant. A parameter that a step takes beyond a bound goes to the bound, and the step of the
-/// others is found anew: what they were to make up for does not happen. Where that pulls it back
-/// from the bound it is let go again, so that a step ends where the damped parabola is least within
-/// the bounds.
+/// The damping follows Marquardt (1963), scaled by the diagonal, so that the units of the
+/// parameters do not matter. A step ends at the minimum of the damped parabola within the bounds:
+///
+/// * A parameter that would leave its bounds is held on the bound, and the step of the other
+///   parameters is computed again.
+/// * If the new slope pulls a held parameter back from its bound, the parameter is released.
 pub struct Bounded<'a, P: LeastSquares> {
     problem: &'a mut P,
     limits: &'a Limits,
     theta: Vec<f64>,
     next: Vec<f64>,
     change: Vec<f64>,
-    /// Moves of parameters that go to a bound, or stay on it.
+    /// Moves of the parameters that are held on a bound.
     held: Vec<Option<f64>>,
-    /// Which bound that is: one for the upper, minus one for the lower.
+    /// Side of the bound: 1 for the upper bound, -1 for the lower bound.
     side: Vec<f64>,
     trial: Option<P::Trial>,
 }
 
 impl<'a, P: LeastSquares> Bounded<'a, P> {
-    /// From the problem's present point `theta`, which lies within the limits.
+    /// Start at the problem's present point `theta`, which must lie within the limits.
     pub fn new(problem: &'a mut P, limits: &'a Limits, theta: Vec<f64>) -> Self {
         let n = theta.len();
         Self {
@@ -152,8 +153,8 @@ impl<'a, P: LeastSquares> Bounded<'a, P> {
         self.theta
     }
 
-    /// Cut `step` to what the limits allow; whether a parameter is pushed over a bound that was not
-    /// held before.
+    /// Cut `step` to the limits. Returns true if a parameter hit a bound on which it was not yet
+    /// held.
     fn cut(&mut self, step: &DVector<f64>) -> bool {
         let limits = self.limits;
         let shortening = limits.shortening(step);
@@ -173,8 +174,8 @@ impl<'a, P: LeastSquares> Bounded<'a, P> {
         hit
     }
 
-    /// Let go of the held parameter that the slope at the end of `step` pulls back from its bound
-    /// most; whether there is one.
+    /// Release the held parameter that the slope at the end of `step` pulls back from its bound
+    /// most. Returns false if there is none.
     fn let_go(&mut self, step: &DVector<f64>, damping: f64) -> bool {
         let normal = self.problem.normal();
         let size = |i: usize| normal.matrix[(i, i)].sqrt();
@@ -206,7 +207,7 @@ impl<P: LeastSquares> Descent for Bounded<'_, P> {
 
     fn step(&mut self, damping: f64) -> Result<Option<Step>, P::Error> {
         self.held.fill(None);
-        // Active sets (Lawson, Hanson, 1974): what meets its bound is held there, and let go again.
+        // Active sets (Lawson, Hanson, 1974).
         let mut rounds = 3 * self.theta.len();
         loop {
             let Some(step) = damped(self.problem.normal(), damping, &self.held) else {
@@ -258,11 +259,13 @@ impl<P: LeastSquares> Descent for Bounded<'_, P> {
     }
 }
 
-/// `-(A + damping diag A)^-1 g`, given the moves of held parameters, nothing for those without
-/// influence; `None` where that has no solution.
+/// `-(A + damping diag A)^-1 g` for given moves of the held parameters.
+///
+/// Parameters without influence on the residuals do not move. Returns `None` if the system has no
+/// solution.
 fn damped(normal: &Normal, damping: f64, held: &[Option<f64>]) -> Option<DVector<f64>> {
     let n = held.len();
-    // Scaled to unit diagonal, the matrix loses no digits to units.
+    // Scaling to a unit diagonal avoids the loss of digits through the units.
     let size = |i: usize| {
         let own = normal.matrix[(i, i)].sqrt();
         if own > 0.0 { own } else { 1.0 }

@@ -1,16 +1,16 @@
-//! Minimizing sums of squares: the one loop of Levenberg-Marquardt type.
+//! Least squares by the Levenberg-Marquardt method: the only such loop of the project.
 //!
-//! Three parts that know nothing of each other, as in a search and a descent:
+//! The three parts are independent of each other:
 //!
-//! * [`search`] says how much a step is damped, when it is accepted and when to stop; it sees
-//!   the loss and what a step promises, no parameter and no matrix.
-//! * [`Bounded`] says how a damped step is found from normal equations and kept within
-//!   bounds. Searches with a structure of their own bring their own [`Descent`].
-//! * [`LeastSquares`] is the problem: loss and normal equations, and whether a trial point
-//!   costs less than one with derivatives.
+//! * [`search`] sets the damping, accepts steps and stops. It sees the loss and its predicted
+//!   reduction, but no parameter and no matrix.
+//! * [`Bounded`] computes a damped step from the normal equations and keeps it within bounds.
+//!   Searches with a special structure implement [`Descent`] themselves.
+//! * [`LeastSquares`] is the problem: it gives the loss and the normal equations, and decides
+//!   whether a trial point needs derivatives.
 //!
-//! It stands here, below all crates that fit, because models of logs, of axes and of
-//! frequency responses and the phases of multisines are found by it.
+//! The module lies below all crates that fit. It serves the models of logs, of axes and of
+//! frequency responses, and the phases of multisines.
 
 mod bounded;
 mod normal;

@@ -1,11 +1,11 @@
-//! Normal equations.
+//! The normal equations of a least-squares problem.
 
 use nalgebra::{DMatrix, DVector};
 
 /// Loss, half its gradient, and the Gauss-Newton matrix, over the free parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Normal {
-    /// `r^T W r`, or what a robust loss makes of it.
+    /// `r^T W r`, or the value of a robust loss in its place.
     pub loss: f64,
     /// `J^T W r`.
     pub gradient: DVector<f64>,
@@ -14,7 +14,7 @@ pub struct Normal {
 }
 
 impl Normal {
-    /// Of `n` parameters and no residual.
+    /// The equations of `n` parameters without any residual.
     pub fn zero(n: usize) -> Self {
         Self {
             loss: 0.0,
@@ -23,15 +23,15 @@ impl Normal {
         }
     }
 
-    /// Residuals of other data.
+    /// Add the residuals of other data.
     pub fn add(&mut self, other: &Self) {
         self.loss += other.loss;
         self.gradient += &other.gradient;
         self.matrix += &other.matrix;
     }
 
-    /// What is known of parameter `slot` beforehand: it is `deviation` off its mean, `std` its
-    /// standard deviation.
+    /// Add prior knowledge of parameter `slot`: its `deviation` from the mean, and the standard
+    /// deviation `std`.
     pub fn add_prior(&mut self, slot: usize, deviation: f64, std: f64) {
         let weight = 1.0 / (std * std);
         self.loss += deviation * deviation * weight;
@@ -39,7 +39,7 @@ impl Normal {
         self.matrix[(slot, slot)] += weight;
     }
 
-    /// By how much the linear model lowers the loss.
+    /// Reduction of the loss that the linear model predicts for `step`.
     pub fn promise(&self, step: &[f64]) -> f64 {
         let mut total = 0.0;
         for (i, s) in step.iter().enumerate() {

@@ -1,20 +1,22 @@
-//! How much to damp, when to accept, when to stop.
+//! The search loop: damping, acceptance of steps, stopping rules.
 
 use super::Status;
 
-/// A damped step, as far as the search has to know it.
+/// The properties of a damped step that the search uses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// Fall of the loss by the linear model before bounds cut the step: nothing at a minimum.
+    /// Reduction of the loss by the linear model, before bounds cut the step. It is zero at a
+    /// minimum.
     pub worth: f64,
-    /// Fall of the loss by the linear model at the point that is to be tried.
+    /// Reduction of the loss by the linear model at the trial point, after bounds have cut the
+    /// step.
     pub promise: f64,
-    /// Largest move of a parameter, a share of its size.
+    /// Largest move of a parameter, relative to its size.
     pub moved: f64,
 }
 
 impl Step {
-    /// A step of which nothing is known before it is tried.
+    /// A step whose properties are unknown before it is tried.
     pub const UNKNOWN: Self = Self {
         worth: f64::INFINITY,
         promise: f64::INFINITY,
@@ -24,37 +26,38 @@ impl Step {
 
 /// A present point, the steps from it, and a trial point.
 pub trait Descent {
-    /// Why a search cannot go on.
+    /// The reason why a search cannot go on.
     type Error;
     /// Loss at the present point.
     fn loss(&self) -> f64;
-    /// Find the step with this damping; `None` where there is none.
+    /// Compute the step with this damping, or return `None` if there is none.
     ///
     /// # Errors
-    /// Ends the search.
+    /// Any error ends the search.
     fn step(&mut self, damping: f64) -> Result<Option<Step>, Self::Error>;
-    /// Take the last step on trial: the loss there, `None` where the model does not hold.
+    /// Evaluate the loss at the end of the last step, or return `None` where the model is not
+    /// valid.
     ///
     /// # Errors
-    /// Ends the search.
+    /// Any error ends the search.
     fn attempt(&mut self) -> Result<Option<f64>, Self::Error>;
-    /// The trial point becomes the present one.
+    /// Make the trial point the present point.
     ///
     /// # Errors
-    /// Ends the search.
+    /// Any error ends the search.
     fn accept(&mut self) -> Result<(), Self::Error>;
-    /// The trial point is given up.
+    /// Give up the trial point.
     fn reject(&mut self) {}
 }
 
-/// How the damping follows success and failure.
+/// How the damping changes after success and failure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Damping {
-    /// By how much of the promise was kept: Nielsen (1999), *Damping parameter in Marquardt's
-    /// method*. Needs derivatives that belong to the present point.
+    /// The damping follows the ratio of actual to predicted reduction: Nielsen (1999), *Damping
+    /// parameter in Marquardt's method*. The derivatives must belong to the present point.
     Kept,
-    /// By constant factors, whatever was promised: where derivatives are taken over from
-    /// another point, or left out where they say nothing, promises are not to be relied on.
+    /// The damping changes by constant factors. Use this rule if predictions are unreliable,
+    /// because derivatives are reused from another point or partly left out.
     Constant {
         /// Damping of the first step.
         start: f64,
@@ -62,23 +65,25 @@ pub enum Damping {
         shrink: f64,
         /// Factor after a failure.
         grow: f64,
-        /// Smallest.
+        /// Smallest damping.
         least: f64,
-        /// Failures in a row before the search gives up.
+        /// Failures in a row after which the search gives up.
         failures: usize,
     },
 }
 
-/// What tells that the loss cannot fall any more.
+/// The test by which a search decides that the loss no longer falls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
-    /// What a step promises, before it is tried.
+    /// Test the predicted reduction of a step, before it is tried.
     Promised,
-    /// What a step has gained, after it was accepted; not believed after failures, which make
-    /// steps short, unless `always`. Nor is a step tried that promises less than it has to gain:
-    /// none at all, or, with `always`, none after a failure.
+    /// Test the actual reduction of an accepted step. Without `always`, the test is skipped after
+    /// failures, because failures make steps short.
+    ///
+    /// A step is not tried at all if its predicted reduction is below the tolerance. With `always`,
+    /// this holds only for a step after a failure.
     Gained {
-        /// Believed after failures too.
+        /// Also test the reduction after failures.
         always: bool,
     },
 }
@@ -86,75 +91,75 @@ pub enum Progress {
 /// When steps are accepted and when a search stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rules {
-    /// Most accepted steps.
+    /// Largest number of accepted steps.
     pub max_iterations: usize,
-    /// Stop when the loss falls, or is promised to fall, by less than this share.
+    /// Stop if the actual or predicted reduction of the loss is below this share of the loss.
     pub loss_tolerance: f64,
-    /// Which of the two.
+    /// Whether the actual or the predicted reduction is tested.
     pub progress: Progress,
-    /// Stop when no parameter moves by more than this share of its size.
+    /// Stop if no parameter moves by more than this share of its size.
     pub step_tolerance: f64,
-    /// Loss at which residuals are rounding errors.
+    /// Loss below which the residuals are rounding errors.
     pub rounding: f64,
-    /// A search that no longer moves has settled where an undamped step promises to lower the
-    /// loss by this share at most, and has stalled where it promises more.
+    /// Limit between a converged and a stalled search, once steps no longer move. The search has
+    /// converged if an undamped step predicts a reduction of at most this share of the loss.
     pub settled: f64,
     /// How steps are damped.
     pub damping: Damping,
 }
 
-/// How and after how much a search ended.
+/// Result of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
-    /// How.
+    /// Why the search ended.
     pub status: Status,
     /// Accepted steps.
     pub iterations: usize,
-    /// Damping that the next step would have had.
+    /// Damping of the step that would have come next.
     pub damping: f64,
 }
 
-/// From here on damping shortens every step, and short steps say nothing of a minimum.
+/// From this damping on, every step is short, so that short steps do not indicate a minimum.
 const STRONG: f64 = 1.0;
 
-/// Share of the promise of a step that failed below which another step is another step.
+/// A step counts as different from a failed one if it predicts at most this share of its reduction.
 const ANOTHER: f64 = 0.5;
-/// Share of its error below which the error of another step has to be.
+/// On a smooth loss, the error of a shorter step is at most this share of the error of the longer.
 const SMOOTH: f64 = 0.75;
-/// Most steps that are passed over at a time.
+/// Largest number of steps that are skipped in a row.
 const PASSED_OVER: usize = 10;
 
 /// A step that failed.
 #[derive(Debug, Clone, Copy)]
 struct Failure {
     promise: f64,
-    /// Error of the linear model: how much more the loss is than promised.
+    /// Error of the linear model: actual minus predicted loss.
     error: f64,
 }
 
 impl Failure {
-    /// Whether a step is hardly another one: it would fail as well.
+    /// Whether `step` is so similar to the failed one that it would fail as well.
     fn is_nearly(&self, step: Step) -> bool {
         self.promise.is_finite() && step.promise > ANOTHER * self.promise
     }
 
-    /// Whether a shorter step failed by about as much.
+    /// Whether a shorter step failed with nearly the same error.
     ///
-    /// The error of a linear model falls at least as steps do. Where it does not, the loss is rough, as
-    /// that of a machine which chatters through its play: no shorter step is any better.
+    /// On a smooth loss, the error of the linear model falls at least in proportion to the step. If
+    /// it does not, the loss is rough, for example because the machine chatters in its backlash.
+    /// Shorter steps then do not help.
     fn as_much_as(&self, shorter: Self) -> bool {
         let another = shorter.promise <= ANOTHER * self.promise;
         another && shorter.error > SMOOTH * self.error
     }
 }
 
-/// Steps until one of the stopping rules holds.
+/// Take steps until one of the stopping rules holds.
 ///
-/// Every step that is accepted lowers the loss. The damping is in units of the curvature, as
-/// [`Descent::step`] understands it.
+/// Every accepted step lowers the loss. The damping has the units that [`Descent::step`] expects.
 ///
 /// # Errors
-/// Those of the descent.
+/// Returns the first error of the descent.
 pub fn search<D: Descent>(descent: &mut D, rules: &Rules) -> Result<Outcome, D::Error> {
     let mut damper = Damper::new(rules.damping);
     let mut iterations = 0;
@@ -181,17 +186,17 @@ pub fn search<D: Descent>(descent: &mut D, rules: &Rules) -> Result<Outcome, D::
     })
 }
 
-/// What became of the trials from one point.
+/// Result of the trials from one point.
 enum Advance {
-    /// One was accepted.
+    /// A step was accepted.
     Moved,
-    /// One was accepted, and gained next to nothing.
+    /// A step was accepted, but its reduction was below the tolerance.
     Arrived,
-    /// None is worth a try, or none succeeds.
+    /// The search ends: no step is worth a trial, or none lowers the loss.
     Ended(Status),
 }
 
-/// Trials, each damped more, until one lowers the loss.
+/// Try steps with growing damping until one lowers the loss.
 fn advance<D: Descent>(
     descent: &mut D,
     rules: &Rules,
@@ -204,7 +209,7 @@ fn advance<D: Descent>(
     let mut passed_over = 0;
     loop {
         let step = descent.step(damper.value)?;
-        // It would not gain enough if it kept its promise.
+        // Even the full predicted reduction would be below the tolerance.
         let little = step.is_some_and(|s| s.promise > 0.0 && s.promise < enough);
         let counts = match rules.progress {
             Progress::Promised => false,
@@ -214,7 +219,8 @@ fn advance<D: Descent>(
             if failures > 0 {
                 return Ok(Advance::Ended(at_end(descent, rules)?));
             }
-            // Damping may be what leaves so little: along a flat valley it holds everything back.
+            // The damping may be the reason for the small reduction: in a flat valley it limits
+            // every step.
             let undamped = descent.step(0.0)?;
             if undamped.is_some_and(|s| s.promise > enough) && damper.relaxed() {
                 continue;
@@ -233,7 +239,7 @@ fn advance<D: Descent>(
             continue;
         }
         passed_over = 0;
-        // A step that was cut may lead uphill: a shorter one is cut less.
+        // A step that bounds have cut may lead uphill. A shorter step is cut less.
         if let Some(step) = step.filter(|s| s.promise > 0.0)
             && let Some(new) = descent.attempt()?
         {
@@ -269,7 +275,7 @@ fn advance<D: Descent>(
     }
 }
 
-/// How a search ended whose steps, however short, gain nothing.
+/// Status of a search whose steps gain nothing, however short they are.
 fn at_end<D: Descent>(descent: &mut D, rules: &Rules) -> Result<Status, D::Error> {
     Ok(if settled(descent, rules)? {
         Status::LossConverged
@@ -278,7 +284,7 @@ fn at_end<D: Descent>(descent: &mut D, rules: &Rules) -> Result<Status, D::Error
     })
 }
 
-/// Whether the search ends before this step is tried.
+/// The status, if the search ends before this step is tried.
 fn end<D: Descent>(
     descent: &mut D,
     rules: &Rules,
@@ -301,7 +307,7 @@ fn end<D: Descent>(
     }))
 }
 
-/// Whether an undamped step promises next to nothing.
+/// Whether an undamped step predicts a reduction below [`Rules::settled`].
 fn settled<D: Descent>(descent: &mut D, rules: &Rules) -> Result<bool, D::Error> {
     let step = descent.step(0.0)?;
     Ok(step.is_some_and(|s| s.worth <= rules.settled * descent.loss()))
@@ -314,13 +320,13 @@ struct Damper {
 }
 
 impl Damper {
-    /// Damping of the first step, where the rule does not say.
+    /// Damping of the first step, if the rule does not set it.
     const START: f64 = 1e-3;
-    /// Below it, damping is lost in rounding.
+    /// A smaller damping is lost in rounding.
     const LEAST: f64 = 1e-15;
-    /// Factor after a failure, itself doubled by every further one.
+    /// Growth of the damping after the first failure. Every further failure doubles the growth.
     const GROWTH: f64 = 2.0;
-    /// Failures in a row: the damping is then 2^78 times as large.
+    /// Allowed failures in a row. The damping has then grown by 2^78.
     const FAILURES: usize = 12;
 
     fn new(rule: Damping) -> Self {
@@ -342,7 +348,7 @@ impl Damper {
         }
     }
 
-    /// After a step that kept the share `kept` of its promise.
+    /// Update the damping after a step with the ratio `kept` of actual to predicted reduction.
     fn succeeded(&mut self, kept: f64) {
         self.growth = Self::GROWTH;
         self.value = match self.rule {
@@ -354,7 +360,7 @@ impl Damper {
         };
     }
 
-    /// Damp the next step less, if there is less.
+    /// Lower the damping of the next step. Returns false if it is already at its lower limit.
     fn relaxed(&mut self) -> bool {
         match self.rule {
             Damping::Constant { shrink, least, .. } if self.value > least => {

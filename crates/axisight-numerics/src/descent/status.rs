@@ -1,18 +1,18 @@
-//! How searches end, and what to do then.
+//! Status of a finished search, with advice.
 
 /// How a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
     /// The loss cannot fall any more.
     LossConverged,
-    /// The parameters no longer move.
+    /// The parameters no longer change.
     StepConverged,
     /// The residuals are rounding errors.
     Exact,
-    /// Out of iterations.
+    /// The iteration limit was reached.
     MaxIterations,
-    /// No damping gives a lower loss although the slope promises one: the model is not
-    /// smooth here, or its derivatives are inaccurate.
+    /// No damping lowers the loss although the slope predicts a reduction. The model is not smooth
+    /// here, or its derivatives are inaccurate.
     Stalled,
 }
 
@@ -26,7 +26,7 @@ impl Status {
         Self::Stalled,
     ];
 
-    /// The word for it in reports.
+    /// Name of the status in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::LossConverged => "loss_converged",
@@ -37,7 +37,7 @@ impl Status {
         }
     }
 
-    /// What to mind; nothing where the search ended at a minimum.
+    /// Advice to the user, or `None` if the search ended at a minimum.
     pub fn advice(self) -> Option<&'static str> {
         match self {
             Self::LossConverged | Self::StepConverged | Self::Exact => None,

@@ -1,68 +1,70 @@
-//! Misuse of effects.
+//! Errors in the use of effects.
 
-/// Misuse of the effect table.
+/// Error in the use of effects.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EffectError {
     /// No effect has this name.
     #[error("effect `{name}`: expected one of {expected}")]
     Unknown {
-        /// What was asked for.
+        /// The requested name.
         name: String,
-        /// The known names.
+        /// The available names.
         expected: String,
     },
     /// Wrong number of parameters.
     #[error("effect `{effect}`: expected {expected} parameters, got {got}")]
     ParameterCount {
-        /// Effect.
+        /// Name of the effect.
         effect: &'static str,
-        /// Length of its parameter table.
+        /// Number of parameters of the effect.
         expected: usize,
-        /// Length given.
+        /// Number of given parameters.
         got: usize,
     },
-    /// An effect of an axis without a valid one, of two axes without two, of the arm with any.
+    /// The place does not fit the scope: an effect of one axis or of two axes needs valid axes, an
+    /// effect of the arm needs none.
     #[error("effect `{effect}`: expected {expected}, got {got}")]
     Axis {
-        /// Effect.
+        /// Name of the effect.
         effect: &'static str,
-        /// What its scope asks for.
+        /// The place that the scope requires.
         expected: String,
-        /// What came.
+        /// The given place.
         got: String,
     },
-    /// An axis of this robot lacks what an effect needs there, or has what excludes it.
+    /// An axis of the robot lacks a part that the effect needs, or has a part that excludes the
+    /// effect.
     #[error("effect `{effect}`: expected {expected}, got {got}")]
     Lacking {
-        /// Effect.
+        /// Name of the effect.
         effect: &'static str,
         /// What the effect needs.
         expected: String,
-        /// The axis, and what it lacks or has.
+        /// The axis with its missing or excluding part.
         got: String,
     },
-    /// A kernel asks for something its point of action has not.
+    /// A kernel uses a feature that its point of action does not offer.
     #[error("effect `{effect}`: expected {expected} where it acts, got {got}")]
     Unsupported {
-        /// Effect.
+        /// Name of the effect.
         effect: &'static str,
         /// What the point of action offers.
         expected: &'static str,
-        /// What the kernel asks for.
+        /// What the kernel uses.
         got: String,
     },
-    /// A parameter outside its bounds or not finite.
+    /// A parameter is outside its bounds or not finite.
     #[error("effect `{effect}`: parameter `{parameter}`: expected {lower} to {upper}, got {got}")]
     Bounds {
-        /// Effect.
+        /// Name of the effect.
         effect: &'static str,
-        /// Parameter.
+        /// Name of the parameter.
         parameter: &'static str,
         /// Lower bound.
         lower: f64,
         /// Upper bound.
         upper: f64,
-        /// Value given.
+        /// Given value.
         got: f64,
     },
 }

@@ -1,51 +1,53 @@
-//! How much accepted formulas of one physical effect differ.
+//! How much accepted formulas of one effect differ.
 
-/// Kinds of effects that have one accepted formula each, so that small differences between them count.
+/// Kinds of effects with one accepted formula each, so that small differences between them count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FormulaKind {
     /// Delays and lags.
     Lag,
     /// Laws of friction.
     Friction,
-    /// Weight, inertia and constant errors of torque: one formula for all.
+    /// Weights, inertias and constant errors of torque.
     Exact,
 }
 
-/// When the formula error of an effect applies, instead of the general one.
+/// When the formula error of an effect replaces the general one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Held {
     /// Always.
     Always,
-    /// If an effect of its kind leaves little more than noise.
+    /// If an effect of the same kind leaves little more than noise.
     NearNoise,
-    /// If an effect of its kind leaves almost nothing of what there is to explain.
+    /// If an effect of the same kind leaves almost nothing of what there is to explain.
     NextToNothing,
 }
 
 /// How much two formulas of an effect may differ.
 ///
-/// Shares of the explained error that the right effect leaves, on simulated machines of other engines.
+/// The errors are shares of the explained error that the true effect leaves, on machines that other
+/// engines simulated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Formula {
-    /// The effects that are compared with this error; None: no others.
+    /// Effects of the same kind are compared with this error; `None` for no comparison.
     pub kind: Option<FormulaKind>,
     /// Share of the explained error by which two formulas may differ [1].
     pub error: f64,
-    /// When that applies.
+    /// When `error` applies.
     pub held: Held,
-    /// Whether the true effect leaves a white residual, so that a difference counts for more.
+    /// Whether the true effect leaves a white residual. A difference in loss then counts for more.
     pub white: bool,
-    /// Standard deviation of a parameter between formulas, as a share of its size [1].
+    /// Standard deviation of a parameter between formulas, relative to its size [1].
     ///
-    /// From draws of the benchmark on foreign engines that were looked at (seeds 3, 5, 110, 120 and 182 to 184: of
-    /// 1,050 values of the last three 97 % are held).
+    /// The values come from benchmark draws on foreign engines; 97 % of 1,050 checked values lie
+    /// within them.
     pub value_error: f64,
-    /// Whether it is that for each number that is fitted: each makes up for what another formula says of the rest.
+    /// Whether `value_error` grows with the number of fitted parameters, because each of them
+    /// compensates for a part of the formula difference.
     pub of_each: bool,
 }
 
 impl Formula {
-    /// A law that each book writes otherwise: tanh or algebraic sign, play or dead zone.
+    /// A law that books write differently: tanh or algebraic sign, backlash or dead zone.
     pub const LAW: Self = Self {
         kind: None,
         error: 0.02,
@@ -54,34 +56,37 @@ impl Formula {
         value_error: 0.01,
         of_each: true,
     };
-    /// A law whose numbers are the same in all books, and only integrators differ: springs, waves, limits.
+    /// A law with the same parameters in all books, such as springs, waves and limits. Only
+    /// integrators differ.
     pub const LINEAR: Self = Self {
         value_error: 0.004,
         of_each: false,
         ..Self::LAW
     };
-    /// A delay or lag: one to three ten-thousandths, once fits have ended. It is linear in the torque; how a
-    /// controller holds its command bends its numbers.
+    /// A delay or lag. After converged fits, formulas differ by 1e-4 to 3e-4: the effect is linear
+    /// in the torque, but its parameters depend on how the controller holds its command.
     pub const LAG: Self = Self {
         kind: Some(FormulaKind::Lag),
         error: 3e-4,
         white: true,
         ..Self::LAW
     };
-    /// A law of friction: half a thousandth, where one of them leaves hardly more than noise.
+    /// A law of friction. Formulas differ by 5e-4 if one of these laws leaves hardly more than
+    /// noise.
     pub const FRICTION: Self = Self {
         kind: Some(FormulaKind::Friction),
         error: 5e-4,
         held: Held::NearNoise,
         ..Self::LAW
     };
-    /// What changes a rigid body or its weight: less than a ten-thousandth.
+    /// A change of a rigid body or its weight. Formulas differ by less than 1e-4.
     pub const RIGID_BODY: Self = Self {
         kind: Some(FormulaKind::Exact),
         error: 1e-4,
         ..Self::LINEAR
     };
-    /// A constant error of torque or of the pose: as little, where one of these leaves next to nothing.
+    /// A constant error of torque or pose. Formulas differ by less than 1e-4 if one of these
+    /// effects leaves next to nothing.
     pub const CONSTANT: Self = Self {
         held: Held::NextToNothing,
         ..Self::RIGID_BODY

@@ -1,24 +1,24 @@
-//! What an effect is: the whole of what is known of it, in one table entry.
+//! Description of an effect: everything known about it, in one table entry.
 //!
-//! Whoever has to treat effects differently asks for a property here; no other place knows
-//! them by name, but for the start values of a search.
+//! Code that treats effects differently reads a property here. Only the start values of a search
+//! know effects by name.
 
 use super::formula::Formula;
 use super::prior::Prior;
 use super::relations::{BegunFrom, Later, LawOf, Plainer, Resembles, Scales, SpringChange};
 
-/// What an effect belongs to.
+/// The part of the robot to which an effect belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
     /// One driven axis.
     Axis,
-    /// Two driven axes, in order.
+    /// Two driven axes; their order matters.
     Axes,
     /// The whole arm.
     Arm,
 }
 
-/// Where in the signal path an effect acts.
+/// The place in the signal path where an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Acts {
     /// Between commanded and applied motor torque.
@@ -31,92 +31,94 @@ pub enum Acts {
     Joint,
     /// Masses and springs of the arm, forces on its joints.
     Arm,
-    /// What the arm stands on: gravity seen from it, springs below the first joint.
+    /// The support of the arm: gravity as seen from it, springs below the first joint.
     Base,
     /// Between true and measured motor position.
     Sensor,
-    /// In the controller, from references and measured positions to the command.
+    /// In the controller, between references, measured positions and command.
     Controller,
 }
 
-/// What kind of cause an effect is.
+/// The kind of cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Family {
-    /// Against the motion.
+    /// Friction and drag.
     Friction,
-    /// Springs, dampers and play of the gear.
+    /// Springs, dampers and backlash of the gear.
     Transmission,
-    /// Repeats with the angle.
+    /// Errors that repeat with the angle.
     Periodic,
-    /// Late or slow torque.
+    /// Delayed or slow torque.
     Timing,
     /// Wrong or limited torque.
     TorquePath,
     /// Inertia and load.
     Load,
-    /// The arm beyond its modelled joints.
+    /// Flexibility and couplings of the arm beyond its modelled joints.
     Arm,
     /// Wrong readings.
     Sensor,
-    /// Another controller than the stated one.
+    /// A controller that differs from the stated one.
     Controller,
 }
 
 /// How a change is stated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
-    /// In the unit of what changes.
+    /// In the unit of the changed quantity.
     Absolute,
-    /// As a share of what changes, which must not be zero.
+    /// Relative to the changed quantity, which must not be zero.
     Relative,
 }
 
-/// A parameter of the robot that an effect stands in for: with the effect free, the
-/// parameter is held.
+/// A parameter of the robot that an effect replaces. While the effect is free, the parameter is
+/// held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StandsFor {
     /// Quantity of the joint, as in parameter names.
     pub quantity: &'static str,
-    /// What the first parameter of the effect says of it.
+    /// How the first parameter of the effect states the change.
     pub change: Change,
 }
 
-/// How a linear model holds an effect.
+/// How a linear model includes an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Linear {
-    /// Changed parameters of the robot: wherever the robot goes, linear or not.
+    /// As changed parameters of the robot, which enter every model of it, linear or not.
     Parameters,
-    /// Its slope at rest describes it in motion too. A slope of zero qualifies where small motion
-    /// about the rest stays in it (a cubic spring without load); not where speed leaves it behind
-    /// (drag).
+    /// By its slope at rest. This is valid where small motion about the rest stays near that slope,
+    /// even a slope of zero (a cubic spring without load). It is not valid where speed leaves the
+    /// slope (drag).
     Slope,
-    /// It comes before the plant: gain, delay, lag.
+    /// As a gain, delay or lag before the plant.
     Path,
-    /// Waves over the motor angle beside the linear plant; numbers of its parameters, in
-    /// order, that are terms of constant torque, torque in proportion to the command, reading.
+    /// As waves over the motor angle, beside the linear plant.
+    ///
+    /// The variant gives the numbers of parameters, in kernel order, for each of the three kinds of
+    /// terms.
     Waves {
-        /// Terms of constant torque.
+        /// Number of terms of constant torque.
         constant: usize,
-        /// Terms in proportion to the command.
+        /// Number of terms of torque proportional to the command.
         proportional: usize,
-        /// Terms of the reading.
+        /// Number of terms of the reading.
         reading: usize,
     },
-    /// Not at all.
+    /// A linear model cannot include it.
     No,
 }
 
-/// What identification may have found from data that hold the effect: the effect, or part of
-/// it, is then in what was found.
+/// A quantity from identification that absorbs an effect or a part of it, if the data contain the
+/// effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Absorber {
     /// Masses and inertias of the links.
     Links,
     /// Inertia of the motor.
     MotorInertia,
-    /// Friction in proportion to the speed.
+    /// Viscous friction.
     ViscousFriction,
-    /// Friction that the speed only turns.
+    /// Dry friction, which depends only on the direction of the speed.
     DryFriction,
     /// Constant torque.
     TorqueOffset,
@@ -124,54 +126,54 @@ pub enum Absorber {
     Stiffness,
     /// Damping of the gear.
     Damping,
-    /// Play of the gear.
+    /// Backlash of the gear.
     Backlash,
     /// The unit of torque.
     Torque,
 }
 
-/// An experiment that tells an effect from others.
+/// An experiment that tells an effect from other effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Experiment {
     /// The same excitation at several amplitudes and preloads.
     Amplitudes,
-    /// A wide band.
+    /// An excitation with a wide band.
     WideBand,
     /// Constant speeds in both directions, with and without load.
     Speeds,
-    /// Slow motion at two speeds, and a sensor on the joint.
+    /// Slow motion at two speeds, with a sensor on the joint.
     SlowTurns,
-    /// Poses, with and without a known load.
+    /// Several poses, with and without a known load.
     Poses,
-    /// References and positions logged beside the torque.
+    /// References and positions, logged beside the torque.
     References,
 }
 
-/// What a parameter does to an effect.
+/// The role of a parameter in its effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// The effect vanishes when every amplitude is at its neutral value.
     Amplitude,
-    /// Shapes the effect; any value is neutral once the amplitudes are.
+    /// It shapes the effect. It may have any value if every amplitude is at its neutral value.
     Shape,
 }
 
-/// What else is to be known of a parameter.
+/// A mark of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
-    /// It may be idle: one coordinate, one wave, one gain of several. An effect does not pay for it where it says
-    /// nothing for it.
+    /// It may be idle, as one of several coordinates, waves or gains. The effect pays no penalty
+    /// for a parameter that explains nothing.
     Optional,
-    /// It says where the effect acts, and counts no more than the axis does.
+    /// It says where the effect acts, and does not count as a number of the effect.
     Place,
-    /// It is how somebody writes the law, not what a machine has.
+    /// It belongs to a way of writing the law, not to the machine.
     Notation,
-    /// A time [s] over which the effect changes at the fastest: no fixed step follows less than one of its own.
+    /// The shortest time [s] in which the effect changes. Fixed steps must not be longer.
     FastestTime,
-    /// A small change of it shows as the change of its inverse: of a stiffness, as that of the compliance.
+    /// A small change shows as a change of the inverse, as for a stiffness by its compliance.
     ShowsInverse,
-    /// Held at its neutral value until the fit of the others is where it belongs; the curve of the law at rest has
-    /// none of it.
+    /// It is held at its neutral value until the fit of the other parameters has converged. The
+    /// curve of the law at rest does not depend on it.
     HeldFirst,
 }
 
@@ -190,19 +192,20 @@ pub struct ParameterInfo {
     pub lower: f64,
     /// Largest admissible value.
     pub upper: f64,
-    /// Typical magnitude: natural scale of a search and width of a plausible range. It must visibly
-    /// change the closed loop of the preset robot.
+    /// Typical magnitude: the natural scale of a search and the width of a plausible range. A
+    /// change of this size must be visible in the closed loop of the preset robot.
     pub typical: f64,
-    /// How its values are spread over machines.
+    /// Distribution of its values over machines.
     pub prior: Prior,
-    /// What typical size and spread rest on.
+    /// Source of `typical` and of the spread.
     pub sizes: &'static str,
-    /// What else is to be known of it.
+    /// Marks of the parameter.
     pub marks: &'static [Mark],
 }
 
 impl ParameterInfo {
-    /// What most parameters are: an amplitude that may be none, without marks. Name, unit, bounds and typical size are its own.
+    /// The most common case: a non-negative amplitude without marks. Name, unit, bounds and typical
+    /// size must be set.
     pub const PLAIN: Self = Self {
         name: "",
         unit: "1",
@@ -220,15 +223,15 @@ impl ParameterInfo {
 /// Description of an effect.
 #[derive(Debug)]
 pub struct EffectInfo {
-    /// Name as in the verdict vocabulary.
+    /// Name, as in a verdict.
     pub name: &'static str,
-    /// One line for people.
+    /// Summary for users, one line.
     pub summary: &'static str,
-    /// Equation in the notation of the thesis.
+    /// Equation, in the notation of the thesis.
     pub equation: &'static str,
-    /// Where the equation comes from.
+    /// Source of the equation.
     pub source: &'static str,
-    /// Axis, two axes or arm.
+    /// One axis, two axes or the arm.
     pub scope: Scope,
     /// Point of action.
     pub acts: Acts,
@@ -236,60 +239,63 @@ pub struct EffectInfo {
     pub family: Family,
     /// Effects that this one becomes at some value of its parameters.
     pub contains: &'static [&'static str],
-    /// Simpler effects that together do what this one does.
+    /// Simpler effects that together do the same.
     pub parts: &'static [&'static str],
-    /// Effects met more often, of the same family, that this one looks like where speed, load or
-    /// pose hardly change.
+    /// More common effects of the same family that this one looks like if speed, load or pose
+    /// hardly change.
     pub usual: &'static [&'static str],
-    /// How many times as often as what looks like it this effect is met, where it is the usual one [1].
+    /// How many times as common this effect is as one that lists it in `usual` [1].
     pub usual_odds: f64,
-    /// Effects of which a machine gives the very same logs of commands and motor angles.
+    /// Effects that give the same logs of commands and motor angles.
     pub twins: &'static [&'static str],
-    /// Whether it has its twins on an axis alone: others feel the motion of its axis when it is.
+    /// Whether it has its twins only on an arm of one axis. On other arms, the other axes feel the
+    /// difference.
     pub twins_alone: bool,
-    /// Another effect that it is like at some values of its parameters.
+    /// Another effect that it equals at some values of its parameters.
     pub resembles: Option<Resembles>,
-    /// The law that it is without what it adds.
+    /// The plainer law that it contains.
     pub plainer: Option<Plainer>,
-    /// Law where whose fit ended its own may begin.
+    /// Law whose fit can start the fit of this effect.
     pub begun_from: Option<BegunFrom>,
-    /// Numbers of it that are looked for where its fit without them ended.
+    /// Parameters that are fitted in a second step, after the fit without them.
     pub later: Option<Later>,
-    /// What it is a law of, if an axis has one of that.
+    /// The part of which it is a law, if an axis has only one law of that part.
     pub law_of: Option<LawOf>,
-    /// What two formulas of it may differ by.
+    /// How much two formulas of it may differ.
     pub formula: Formula,
-    /// How it makes a gear another spring.
+    /// How it changes the spring of a gear.
     pub spring: Option<SpringChange>,
-    /// Whose torques it changes as another unit of torque would.
+    /// The torques that it scales like a change of torque unit.
     pub scales: Option<Scales>,
-    /// Causes of its axis without which torque predicted from measured motion does not show it for sure: what no
-    /// formula has of a real machine passes for it.
+    /// Causes of the same axis without which torque predicted from measured motion does not show
+    /// the effect reliably, because errors of the formulas look like it.
     pub beside: &'static [&'static str],
-    /// Whether no two runs repeat what it does: it is noise, which no simulator removes.
+    /// Whether no two runs repeat it. Such an effect is noise, which no simulator removes.
     pub unrepeatable: bool,
-    /// Parameter of the robot it is a change of.
+    /// Parameter of the robot that it changes.
     pub stands_for: Option<StandsFor>,
-    /// How a linear model holds it.
+    /// How a linear model includes it.
     pub linear: Linear,
-    /// Whether torque predicted from measured motion can hold it; false for effects in the
-    /// transmission and of the sensor, whose place a rigid gear takes there.
+    /// Whether torque predicted from measured motion can include it. It is false for effects of the
+    /// sensor and in the transmission, because that prediction assumes a rigid gear.
     pub inverse_dynamics: bool,
-    /// What it is part of once identified.
+    /// Identified quantities that absorb it.
     pub absorbed_by: &'static [Absorber],
-    /// Experiments that show it, the best first.
+    /// Experiments that tell it from other effects, the best first.
     pub shown_by: &'static [Experiment],
     /// Parameters in kernel order.
     pub parameters: &'static [ParameterInfo],
 }
 
 impl EffectInfo {
-    /// What most effects are: on one axis, held by torque predicted from measured motion and by no linear model,
-    /// akin to no other, with a formula that each book writes otherwise; met four times as often as what looks
-    /// like it.
+    /// The most common case of an effect.
     ///
-    /// An effect states what it is otherwise, `..EffectInfo::PLAIN` the rest. Of its own it states at least name,
-    /// summary, equation, source, point of action, family and parameters.
+    /// It acts on one axis, torque predicted from measured motion can include it, and linear models
+    /// cannot. It is related to no other effect. Its formula is written differently in each book.
+    /// It is four times as common as its look-alikes.
+    ///
+    /// An effect sets at least name, summary, equation, source, point of action, family and
+    /// parameters, and takes the rest from `..EffectInfo::PLAIN`.
     pub const PLAIN: Self = Self {
         name: "",
         summary: "",

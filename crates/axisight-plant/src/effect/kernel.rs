@@ -1,9 +1,9 @@
-//! The points where an effect may act, and what it sees there.
+//! The interface of an effect: the points where it may act, and the state of the plant there.
 
 use crate::robot::{Body, Chain, ChainJoint, Motion};
 use axisight_scalar::Scalar;
 
-/// State of one motor as its effects see it.
+/// State of one motor, as an input of effects.
 #[derive(Debug, Clone, Copy)]
 pub struct Motor<'a, S> {
     /// Motor angle phi [rad].
@@ -12,24 +12,24 @@ pub struct Motor<'a, S> {
     pub speed: S,
     /// Commanded torque of the sample, u [Nm].
     pub command: S,
-    /// Gear torque the motor carries, motor side [Nm]; zero for a rigid transmission.
+    /// Gear torque on the motor, motor side [Nm]; zero for a rigid transmission.
     pub load: S,
-    /// States of the effect itself; empty where nothing is integrated (inverse dynamics).
+    /// The effect's own states; empty if nothing is integrated (inverse dynamics).
     pub internal: &'a [S],
 }
 
-/// What a gear makes of its geometric deflection.
+/// Result of an effect on the geometric deflection of a gear.
 #[derive(Clone, Copy)]
 pub struct Deflected<S> {
     /// Deflection that loads the spring [rad].
     pub loaded: S,
-    /// Its slope over the geometric one.
+    /// Slope of `loaded` over the geometric deflection.
     pub slope: S,
     /// Share of the geometric rate that the gear damps.
     pub damped: S,
 }
 
-/// State of a gear spring as its effects see it.
+/// State of a gear spring, as an input of effects.
 #[derive(Debug, Clone, Copy)]
 pub struct Spring<'a, S> {
     /// Deflection that loads the spring [rad].
@@ -38,11 +38,11 @@ pub struct Spring<'a, S> {
     pub rate: S,
     /// Stiffness of the linear spring [Nm/rad].
     pub stiffness: S,
-    /// States of the effect itself; empty at rest.
+    /// The effect's own states; empty at rest.
     pub internal: &'a [S],
 }
 
-/// State of a driven joint as its effects see it.
+/// State of a driven joint, as an input of effects.
 #[derive(Debug, Clone, Copy)]
 pub struct Joint<'a, S> {
     /// Joint angle q [rad].
@@ -51,7 +51,7 @@ pub struct Joint<'a, S> {
     pub speed: S,
     /// Gear ratio r, joint angle per motor angle.
     pub ratio: f64,
-    /// States of the effect itself; empty where nothing is integrated.
+    /// The effect's own states; empty if nothing is integrated.
     pub internal: &'a [S],
 }
 
@@ -68,16 +68,16 @@ pub struct CoupledAxis<S> {
     pub joint_speed: S,
 }
 
-/// State of two axes as an effect between them sees it.
+/// State of two coupled axes, as an input of effects between them.
 #[derive(Debug, Clone, Copy)]
 pub struct Pair<'a, S> {
     /// The axes in the order of the setting.
     pub axes: [CoupledAxis<S>; 2],
-    /// States of the effect itself; empty where nothing is integrated.
+    /// The effect's own states; empty if nothing is integrated.
     pub internal: &'a [S],
 }
 
-/// What an effect adds to an axis.
+/// Torque that an effect adds to an axis.
 #[derive(Debug, Clone, Copy)]
 pub struct AxisTorque<S> {
     /// On the motor shaft [Nm].
@@ -87,7 +87,7 @@ pub struct AxisTorque<S> {
 }
 
 impl<S: Scalar> AxisTorque<S> {
-    /// Nothing.
+    /// No torque.
     pub fn zero() -> Self {
         let zero = S::zero();
         Self {
@@ -97,25 +97,26 @@ impl<S: Scalar> AxisTorque<S> {
     }
 }
 
-/// State of the arm as its effects see it; joints of the robot, base to tip.
+/// State of the arm, as an input of its effects. Joints are ordered from base to tip.
 #[derive(Debug, Clone, Copy)]
 pub struct Arm<'a, S> {
     /// Joint angles [rad].
     pub angles: &'a [S],
     /// Joint speeds [rad/s]; zero at rest.
     pub speeds: &'a [S],
-    /// States of the effect itself; empty where nothing is integrated.
+    /// The effect's own states; empty if nothing is integrated.
     pub internal: &'a [S],
 }
 
-/// The parts of a plant an arm or transmission effect may change before a run.
+/// The parts of a plant that an effect of the arm or the transmission may change before a run.
 #[derive(Debug)]
 pub struct PlantParameters<'a, S> {
-    /// Links, and gravity in the frame of the base.
+    /// Links of the chain, and gravity in the frame of the base.
     pub chain: &'a mut Chain<S>,
     /// Joint of the chain that the axis drives; `None` for arm effects.
     pub driven: Option<usize>,
-    /// Joint of the chain that carries the link of the axis; `None` for arm effects or without mass.
+    /// Joint of the chain that carries the link of the axis; `None` for arm effects or if there is
+    /// no link with mass.
     pub link: Option<usize>,
     /// Gear stiffness of the axis [Nm/rad]; `None` for arm effects or a rigid transmission.
     pub stiffness: Option<&'a mut S>,
@@ -126,26 +127,26 @@ pub struct PlantParameters<'a, S> {
 }
 
 impl<S: Scalar> PlantParameters<'_, S> {
-    /// The joint that the axis drives.
+    /// The joint that the axis drives; `None` for arm effects.
     pub fn joint(&mut self) -> Option<&mut ChainJoint<S>> {
         self.chain.joints.get_mut(self.driven?)
     }
 
-    /// The joint that the link of the axis carries; `None` behind the last.
+    /// The joint on the link of the axis; `None` after the last one.
     pub fn next_joint(&mut self) -> Option<&mut ChainJoint<S>> {
         self.chain.joints.get_mut(self.link? + 1)
     }
 
-    /// The body that moves with the axis.
+    /// The body that moves with the axis; `None` if there is none.
     pub fn body(&mut self) -> Option<&mut Body<S>> {
         self.chain.joints[self.link?].body.as_mut()
     }
 }
 
-/// A spring the arm stands on: an elastic joint below the first one.
+/// A spring below the arm: an elastic joint below the first one.
 #[derive(Debug, Clone, Copy)]
 pub struct BaseJoint<S> {
-    /// How it moves.
+    /// Kind of motion of the joint.
     pub motion: Motion,
     /// Unit vector of its axis in the base frame.
     pub axis: [f64; 3],
@@ -153,49 +154,50 @@ pub struct BaseJoint<S> {
     pub stiffness: S,
     /// Damping [Nm s/rad or N s/m].
     pub damping: S,
-    /// What moves with it besides the arm.
+    /// Body that moves with the joint, besides the arm.
     pub body: Option<Body<S>>,
 }
 
 /// Kinematic error of a gear over the motor angle.
 #[derive(Debug, Clone, Copy)]
 pub struct GearError<S> {
-    /// Joint angle by which the gear runs ahead [rad].
+    /// Joint angle by which the gear leads [rad].
     pub ahead: S,
-    /// Its derivative: what it adds to the gear ratio of rates.
+    /// Derivative of `ahead`, which is added to the gear ratio of rates.
     pub slope: S,
-    /// What it adds to the ratio at which the gear's torque returns to the motor: the slope itself
-    /// where the gear conserves power.
+    /// Addition to the ratio by which the gear's torque acts on the motor. It equals `slope` if the
+    /// gear conserves power.
     pub returned: S,
 }
 
-/// The points where an effect may act; every default is "not here".
+/// An effect: the points where it may act. Every default means that it does not act there.
 ///
-/// States of its own start at zero; their rates are asked for where the effect acts
-/// ([`Kernel::motor_rates`] for an effect on the motor, and so on).
+/// The effect's own states start at zero. Their rates are requested at the point of action, for
+/// example by [`Kernel::motor_rates`] for an effect on the motor.
 pub trait Kernel<S: Scalar>: Send + Sync {
-    /// Number of states the effect has of its own.
+    /// Number of the effect's own states.
     fn n_internal(&self) -> usize {
         0
     }
 
-    /// The state of an effect whose one state moves with the time since the log began alone; `None` of all others.
+    /// Value of a single own state that depends only on the time since the start of the log; `None`
+    /// for all other effects.
     fn state_at(&self, _time: S) -> Option<S> {
         None
     }
 
-    /// Change masses, stiffness or gravity before the run.
+    /// Change masses, inertias, stiffness or gravity before the run.
     fn prepare(&self, _plant: &mut PlantParameters<'_, S>) {}
-    /// Springs below the first joint, ground to arm.
+    /// Springs below the first joint, from ground to arm.
     fn base_joints(&self) -> Vec<BaseJoint<S>> {
         Vec::new()
     }
 
-    /// What the drive makes of a command before any delay or lag, e.g. a limit [Nm].
+    /// Command [Nm] that the drive accepts, before any delay or lag. Example: a limit.
     fn command(&self, torque: S) -> S {
         torque
     }
-    /// Motor torque as an affine function of the torque the drive delivers [Nm].
+    /// Motor torque [Nm] for the torque that the drive delivers; must be affine.
     fn drive(&self, torque: S) -> S {
         torque
     }
@@ -227,7 +229,7 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     /// Rates of the effect's own states on a motor [1/s].
     fn motor_rates(&self, _motor: &Motor<'_, S>, _rates: &mut [S]) {}
 
-    /// What a geometric deflection [rad] makes of the gear.
+    /// Loaded deflection of the gear for a geometric deflection [rad].
     fn deflection(&self, delta: S) -> Deflected<S> {
         Deflected {
             loaded: delta,
@@ -235,23 +237,23 @@ pub trait Kernel<S: Scalar>: Send + Sync {
             damped: S::one(),
         }
     }
-    /// Deflection from the one that loads the spring; `delta` for [`Kernel::deflection`] at rest.
+    /// Geometric deflection for a loaded one, the inverse of [`Kernel::deflection`] at rest.
     fn deflection_inverse(&self, loaded: S) -> S {
         loaded
     }
-    /// Gear torque added to the linear spring and damper [Nm, joint side]; positive for a positive
-    /// deflection or rate where it restores or damps.
+    /// Gear torque added to the linear spring and damper [Nm, joint side]. A restoring or damping
+    /// torque is positive for a positive deflection or rate.
     fn gear_torque(&self, _spring: &Spring<'_, S>) -> S {
         S::zero()
     }
     /// Rates of the effect's own states in a gear [1/s].
     fn gear_rates(&self, _spring: &Spring<'_, S>, _rates: &mut [S]) {}
-    /// Kinematic error of the gear over the motor angle.
+    /// Kinematic error of the gear at a motor angle.
     fn transmission_error(&self, _angle: S) -> Option<GearError<S>> {
         None
     }
 
-    /// Whether what acts on the motor also acts on the driven joint, behind the gear.
+    /// Whether the torque on the motor also acts on the driven joint, behind the gear.
     fn acts_behind_gear(&self) -> bool {
         false
     }
@@ -262,36 +264,38 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     /// Rates of the effect's own states on a joint [1/s].
     fn joint_rates(&self, _joint: &Joint<'_, S>, _rates: &mut [S]) {}
 
-    /// Torques added on two axes, in their order.
+    /// Torques added on two axes, in the order of the axes.
     fn pair_torque(&self, _pair: &Pair<'_, S>) -> [AxisTorque<S>; 2] {
         [AxisTorque::zero(); 2]
     }
-    /// Share of the first axis' turn (joint side) by which the gear of the second one is turned.
+    /// Turn of the second axis' gear per turn of the first axis (joint side).
     fn turns_next(&self) -> Option<S> {
         None
     }
     /// Rates of the effect's own states between two axes [1/s].
     fn pair_rates(&self, _pair: &Pair<'_, S>, _rates: &mut [S]) {}
 
-    /// Add forces on the joints of the arm [Nm or N] to `force`, one entry a joint.
+    /// Add the forces on the joints of the arm [Nm or N] to `force`, one entry per joint.
     fn arm_force(&self, _arm: &Arm<'_, S>, _force: &mut [S]) {}
     /// Rates of the effect's own states on the arm [1/s].
     fn arm_rates(&self, _arm: &Arm<'_, S>, _rates: &mut [S]) {}
 
-    /// By how much the controller's clock is fast against that of the logs [1].
+    /// Relative error of the controller's clock [1]; positive if it is fast compared with the clock
+    /// of the logs.
     fn clock_drift(&self) -> Option<S> {
         None
     }
-    /// Factors of the controller's proportional and integral gain, and of a cascade's gain of position [1].
+    /// Factors of the controller's gains [1]: proportional, integral, and the position gain of a
+    /// cascade.
     fn controller_gains(&self) -> Option<[S; 3]> {
         None
     }
-    /// What the controller adds to its command for the rate of the reference [Nm s^2/rad] and for the
-    /// reference itself [Nm s/rad].
+    /// Feed-forward gains of the controller: for the rate of the reference [Nm s^2/rad], and for
+    /// the reference itself [Nm s/rad].
     fn feedforward(&self) -> Option<[S; 2]> {
         None
     }
-    /// Time constant of the filter through which the controller takes the speed [s]; `None` at zero.
+    /// Time constant of the controller's speed filter [s]; `None` at zero.
     fn speed_filter(&self) -> Option<S> {
         None
     }
@@ -304,7 +308,7 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn sensor(&self, _angle: S) -> S {
         S::zero()
     }
-    /// By how much the motor position is read late [s].
+    /// Delay of the motor position reading [s].
     fn reading_delay(&self) -> Option<S> {
         None
     }
@@ -312,8 +316,8 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     fn resolution(&self) -> Option<S> {
         None
     }
-    /// Error of the measured joint angle [rad], from which the motor position is taken; what it is
-    /// where a run begins counts for nothing.
+    /// Error [rad] of a joint encoder from which the motor position is computed. Its value at the
+    /// start of a run does not count.
     fn joint_sensor(&self, _angle: S) -> Option<S> {
         None
     }

@@ -1,4 +1,4 @@
-//! What an effect is: what is known of it, the points where it may act, how it is misused.
+//! Effects: their description, the points where they may act, and errors in their use.
 
 mod error;
 mod formula;

@@ -1,17 +1,17 @@
-//! How values of a parameter are spread over machines and those who write their laws.
+//! Distributions of parameter values over machines and notations.
 
-/// A density of values, of one within the bounds of the parameter.
+/// A probability density of a parameter within its bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Prior {
-    /// Normal about the neutral value, with the typical size as standard deviation: half of it where the neutral
-    /// value is a bound. None at all is as usual as any.
+    /// Normal about the neutral value, with the typical size as standard deviation. If the neutral
+    /// value is a bound, only one half of the density is used. Values near neutral are the most
+    /// likely.
     HalfNormal,
-    /// Its logarithm is normal about that of the typical size, with a standard deviation [1]: something is there,
-    /// and none at all has no density.
+    /// Log-normal about the typical size. The density at zero is zero.
     LogNormal {
         /// Standard deviation of the logarithm [1].
         spread: f64,
     },
-    /// Any value is as usual: shares, and orders that data show by themselves.
+    /// Uniform within the bounds, for shares and for orders that the data determine.
     Uniform,
 }

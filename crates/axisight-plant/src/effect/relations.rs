@@ -1,69 +1,71 @@
-//! How an effect and others are akin: the plainer law in it, what it is like, what a fit of it begins from.
+//! Relations between effects: the plainer law in an effect, look-alikes, and fits that start
+//! another fit.
 
-/// How one sees that a law has what it adds to a plainer one.
+/// How logs show that a law has what it adds to a plainer law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shown {
-    /// By the standard errors of the numbers that it adds, each of its own size.
+    /// By the standard errors of the added parameters, relative to their sizes.
     Sizes,
-    /// By how much larger its friction is at some speed than at high speed.
+    /// By the rise of friction at some speed above its value at high speed.
     Rise,
 }
 
-/// The law that an effect is, where what it adds is not there.
+/// The plainer law that an effect contains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plainer {
-    /// Its name.
+    /// Name of the plainer law.
     pub law: &'static str,
-    /// Parameters of the effect that it has not.
+    /// Parameters that the effect adds to the plainer law.
     pub adds: &'static [&'static str],
-    /// How many times likelier it is than the effect, where nothing of these shows [1].
+    /// How many times as likely the plainer law is if the logs do not show the added parameters
+    /// [1].
     pub likelier: f64,
-    /// How that shows.
+    /// How the logs show the added parameters.
     pub shown: Shown,
 }
 
-/// An effect that another one, at some values of its parameters, is hardly to be told from.
+/// An effect that another effect equals at some values of its parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resembles {
-    /// Name of that effect, which has one parameter.
+    /// Name of the equalled effect, which has one parameter.
     pub law: &'static str,
-    /// Parameter in proportion to that one.
+    /// Parameter of the other effect that is proportional to the parameter of `law`.
     pub size: &'static str,
-    /// That one over this parameter.
+    /// Ratio of the parameter of `law` to the parameter `size`.
     pub ratio: f64,
     /// Values of the other parameters.
     pub shape: &'static [(&'static str, f64)],
-    /// Of machines that both describe as well, how many times as many have that effect [1].
+    /// How many times as many machines have `law`, if both effects describe them equally well [1].
     pub rarer: f64,
 }
 
-/// A law that a fit may begin from: as that ended.
+/// A law whose fit can start the fit of another effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BegunFrom {
-    /// Its name.
+    /// Name of the law.
     pub law: &'static str,
-    /// Parameters of that law, each with the one that takes its value.
+    /// Pairs of a parameter of the law and the parameter of the effect that takes its value.
     pub takes: &'static [(&'static str, &'static str)],
 }
 
-/// Numbers of a law that are looked for only where its fit without them ended.
+/// Parameters of a law that are fitted in a second step, after the fit without them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Later {
-    /// Amplitude that is held at its neutral value first.
+    /// Amplitude that is first held at its neutral value.
     pub amplitude: &'static str,
-    /// Where its fit begins then, in its unit.
+    /// Start value of the amplitude in the second step, in its unit.
     pub begin: f64,
-    /// How large it may be then, in its unit.
+    /// Upper bound of the amplitude in the second step, in its unit.
     pub most: f64,
-    /// Shape of it.
+    /// Shape that belongs to the amplitude.
     pub shape: &'static str,
-    /// Law whose start values and bounds that shape has, under the same name.
+    /// Law that has a parameter of the same name as `shape`, and gives its start values and bounds.
     pub as_of: &'static str,
 }
 
-/// A machine part or property of which an axis has one, and several effects are laws.
+/// A part or property of which an axis has only one, while several effects are laws of it.
 ///
-/// A second law of it on an axis is no second cause: it mends the formula of the first.
+/// A second law on the same axis is not a second cause. It corrects the formula of the first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LawOf {
     /// The gear as a spring and damper.
@@ -72,22 +74,22 @@ pub enum LawOf {
     DryFriction,
 }
 
-/// A gear whose law makes it another spring.
+/// How a law changes the spring of a gear.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SpringChange {
-    /// Parameters whose sums are the changes of its stiffness [1], that of its middle first.
+    /// Parameters whose sums are the relative changes of stiffness [1], from the middle outwards.
     pub sums: &'static [&'static [&'static str]],
-    /// Law of a gear whose middle has lost its stiffness.
+    /// Name of the law for a gear without stiffness in its middle.
     pub without_middle: &'static str,
 }
 
-/// Whose torques masses, weights and poses change as another unit of torque does.
+/// The torques that an effect scales like a change of torque unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scales {
-    /// That of its own axis.
+    /// The torque of its own axis.
     Own,
-    /// Those of its axis and of what carries that; of the whole arm all.
+    /// The torques of its axis and of the axes that carry it; for the arm, all torques.
     Carriers,
-    /// Those of all axes.
+    /// The torques of all axes.
     Every,
 }

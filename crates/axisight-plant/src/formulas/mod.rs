@@ -1,8 +1,8 @@
 //! Equations of the effects as plain functions over any scalar.
 //!
-//! The kernels of the effects are made of them, and so are the models that do not go through a
-//! plant, above all the chain of masses that is fitted to one axis: an equation is written once,
-//! and what one model identifies is what the other simulates.
+//! The kernels of the effects use them, and so do models without a plant, above all the chain of
+//! masses that is fitted to one axis. Each equation is written once, so that identification and
+//! simulation agree.
 
 mod friction;
 mod gear;

@@ -17,14 +17,14 @@ pub struct Gear<S> {
     pub(super) slot: usize,
 }
 
-/// An axis whose motor turns the gear of another one along.
+/// Coupling to another axis whose motor also turns this gear.
 #[derive(Debug, Clone, Copy)]
 pub struct Lead<S> {
-    /// Index of the axis.
+    /// Index of the other axis.
     pub axis: usize,
-    /// Turn of the gear, joint side, per turn of the motor there.
+    /// Turn of this gear, joint side, per turn of the other motor.
     pub by: S,
-    /// The effect that does so.
+    /// Name of the effect that couples the axes.
     pub effect: &'static str,
 }
 
@@ -42,18 +42,18 @@ pub struct Axis<S> {
     pub(super) inverse_motor_inertia: S,
     /// Compliant transmission; `None` is rigid.
     pub gear: Option<Gear<S>>,
-    /// Everything that acts on this axis.
+    /// All effects on this axis.
     pub kernels: Vec<Arc<dyn Kernel<S>>>,
     pub(super) on_motor: Vec<Own<S>>,
     pub(super) on_gear: Vec<Own<S>>,
     pub(super) on_joint: Vec<Own<S>>,
-    /// Axes whose turn turns this gear along.
+    /// Axes whose motors also turn this gear.
     pub led_by: Vec<Lead<S>>,
 }
 
 impl<S: Scalar> Axis<S> {
-    /// Torque of the effects on the driven joint [Nm] without states of their own: at rest,
-    /// or where motion is measured and nothing is integrated.
+    /// Torque of the effects without states on the driven joint [Nm]. Use it at rest, or if the
+    /// motion is measured and nothing is integrated.
     pub fn joint_torque_of(&self, angle: S, speed: S) -> S {
         let state = Joint {
             angle,
@@ -68,8 +68,8 @@ impl<S: Scalar> Axis<S> {
         torques.fold(S::zero(), |a, b| a + b)
     }
 
-    /// Torque of the effects on the driven joint [Nm]; `own` and `own_rates` run over the
-    /// states of all effects.
+    /// Torque of the effects on the driven joint [Nm]; `own` and `own_rates` hold the states of all
+    /// effects.
     pub(super) fn joint_torque(&self, angle: S, speed: S, own: &[S], own_rates: &mut [S]) -> S {
         let mut torque = S::zero();
         for Own { kernel, internal } in &self.on_joint {
@@ -87,7 +87,7 @@ impl<S: Scalar> Axis<S> {
         torque
     }
 
-    /// Torque of the effects on the motor [Nm] at the load torque that it feels.
+    /// Torque of the effects on the motor [Nm]; `at` gives its state with the load torque.
     #[inline(never)]
     pub(super) fn motor_torque(&self, at: &Motor<S>, own: &[S], own_rates: &mut [S]) -> S {
         let mut torque = S::zero();
@@ -104,7 +104,8 @@ impl<S: Scalar> Axis<S> {
         torque
     }
 
-    /// Torque of the gear at deflection `delta` [rad] that changes at `rate` [Nm, joint side].
+    /// Torque of the gear [Nm, joint side] at the deflection `delta` [rad] and its rate `rate`
+    /// [rad/s].
     #[inline]
     pub(super) fn gear_torque(
         &self,
@@ -114,7 +115,8 @@ impl<S: Scalar> Axis<S> {
         own: &[S],
         own_rates: &mut [S],
     ) -> S {
-        // Apart from the calls of effects, around which nothing stays in registers.
+        // A separate function for gears with effects, because calls of effects would force this
+        // path out of registers.
         if self.on_gear.is_empty() {
             return gear.stiffness.fma(delta, gear.damping * rate);
         }
@@ -173,7 +175,7 @@ impl<S: Scalar> Axis<S> {
         angle
     }
 
-    /// Motor torque that carries a static load [Nm, joint side] at a motor angle.
+    /// Motor torque that holds a static load [Nm, joint side] at a motor angle.
     pub(super) fn motor_torque_at_rest(&self, angle: S, load: S) -> S {
         let slopes = self
             .on_gear
@@ -182,10 +184,10 @@ impl<S: Scalar> Axis<S> {
         load * slopes.fold(S::constant(self.ratio), |r, e| r + e.returned)
     }
 
-    /// Geometric gear deflection under a static load [Nm, joint side]; zero when rigid.
+    /// Geometric gear deflection under a static load [Nm, joint side]; zero for a rigid gear.
     ///
-    /// Fixed-point iteration on the secant stiffness, halfway at a time: for a hardening
-    /// spring the error at least halves each time, however hard it gets.
+    /// The fixed-point iteration on the secant stiffness goes half of the way each time. For a
+    /// hardening spring this at least halves the error, however stiff the spring becomes.
     fn static_deflection(&self, load: S) -> S {
         let Some(gear) = &self.gear else {
             return S::zero();

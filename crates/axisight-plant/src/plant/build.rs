@@ -1,4 +1,4 @@
-//! A plant from a robot, changed parameters and the kernels of effects.
+//! Construction of a plant from a robot, changed parameters and the kernels of effects.
 
 use super::axis::{Lead, axes};
 use super::equations::Plant;
@@ -8,33 +8,34 @@ use crate::robot::{Chain, ChainJoint, Dynamics, MOST_JOINTS, Parameter, Place, R
 use axisight_scalar::Scalar;
 use std::sync::Arc;
 
-/// Why a plant cannot be built.
+/// Reason why a plant cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlantError {
     /// Effects or fitted parameters leave a link without mass.
     #[error("mass of the link of joint {joint}: expected more than 0 kg, got {got}")]
     Mass {
-        /// Joint, from 1.
+        /// Joint, counted from 1.
         joint: usize,
         /// Mass [kg].
         got: f64,
     },
-    /// The chain is longer than the compiled sizes.
+    /// The chain has more joints than the compiled code supports.
     #[error("joints: expected at most {MOST_JOINTS}, got {0}")]
     TooManyJoints(usize),
-    /// An effect is misused.
+    /// An effect is used incorrectly.
     #[error(transparent)]
     Effect(#[from] EffectError),
 }
 
-/// The kernel of an effect, what is known of the effect, and where it acts.
+/// A kernel of an effect with its description and its place.
 pub type PlacedKernel<S> = (&'static EffectInfo, Place, Arc<dyn Kernel<S>>);
 
 impl<S: Scalar> Plant<S> {
-    /// The plant of `robot` with some parameters replaced and without any effect but `kernels`.
+    /// The plant of `robot` with some parameters replaced, and with the effects `kernels` only.
     ///
     /// # Errors
-    /// [`PlantError`] when a kernel is misplaced or asks for what its point of action has not.
+    /// [`PlantError`] if a kernel is misplaced or uses a feature that its point of action does not
+    /// offer, if a link has no mass left, or if the chain is too long.
     #[inline(never)]
     pub fn with_kernels(
         robot: &RobotDescription,
@@ -75,7 +76,8 @@ impl<S: Scalar> Plant<S> {
         })
     }
 
-    /// Effects may have changed masses, inertias and the chain itself.
+    /// Check and complete the plant, because effects may have changed masses, inertias and the
+    /// chain.
     fn finish(&mut self) -> Result<(), PlantError> {
         self.check_masses()?;
         if self.chain.len() > MOST_JOINTS {
@@ -88,7 +90,7 @@ impl<S: Scalar> Plant<S> {
         Ok(())
     }
 
-    /// Effects may take mass away, but not all of it.
+    /// Check that effects leave every link with a positive mass.
     fn check_masses(&self) -> Result<(), PlantError> {
         for (i, joint) in self.chain.joints.iter().skip(self.n_base).enumerate() {
             let Some(body) = &joint.body else { continue };
@@ -105,7 +107,7 @@ impl<S: Scalar> Plant<S> {
         Ok(())
     }
 
-    /// Put a kernel where it acts.
+    /// Add a kernel at its point of action.
     fn add_kernel(
         &mut self,
         info: &'static EffectInfo,
@@ -141,7 +143,7 @@ impl<S: Scalar> Plant<S> {
         Ok(())
     }
 
-    /// The kernel with its states among those of the plant.
+    /// Reserve states for the kernel among those of the plant.
     fn with_states(&mut self, own: Own<S>) -> Own<S> {
         let first = self.n_internal;
         self.n_internal += own.kernel.n_internal();
@@ -165,7 +167,7 @@ impl<S: Scalar> Plant<S> {
         self.on_arm.push(own);
     }
 
-    /// Put joints below the first one; all others move up.
+    /// Insert joints below the first one. All other joints move up.
     fn insert_base(&mut self, joints: Vec<BaseJoint<S>>) {
         let count = joints.len();
         for axis in &mut self.axes {
@@ -240,7 +242,7 @@ impl<S: Scalar> Plant<S> {
 }
 
 impl<S: Scalar> Plant<S> {
-    /// Joint that carries the link which moves with an axis and not with the next one.
+    /// Joint that carries the link which moves with an axis but not with the next axis.
     fn link(&self, index: usize) -> Option<usize> {
         let end = self
             .axes
@@ -250,7 +252,7 @@ impl<S: Scalar> Plant<S> {
     }
 }
 
-/// Whether an axis would have a current loop of second order beside another one, both at work.
+/// Whether an axis would get a second active current loop, one of them of second order.
 fn one_too_many<S: Scalar>(others: &[Arc<dyn Kernel<S>>], new: &Arc<dyn Kernel<S>>) -> bool {
     let at_work = |t: S| (0..S::LANES).any(|lane| t.lane(lane) > 0.0);
     let first = |k: &Arc<dyn Kernel<S>>| k.lag().is_some_and(at_work);
@@ -272,7 +274,7 @@ fn misplaced(info: &'static EffectInfo, n_axes: usize, place: Place) -> EffectEr
     }
 }
 
-/// What is integrated can have states; the torque path and the sensor work from sample to sample.
+/// Only integrated effects can have states; torque path and sensor work from sample to sample.
 fn check_states(info: &'static EffectInfo, states: usize) -> Result<(), EffectError> {
     let integrated = !matches!(
         info.acts,

@@ -15,13 +15,13 @@ use std::ops::Range;
 /// A robot with its effects, ready to be integrated.
 #[derive(Clone)]
 pub struct Plant<S> {
-    /// Rigid-body chain, with the joints below the first one that effects put there.
+    /// Rigid-body chain, with the joints that effects put below the first one.
     pub chain: Chain<S>,
     /// Equations of motion of the chain.
     pub dynamics: Dynamics<S>,
     /// Driven axes in chain order.
     pub axes: Vec<Axis<S>>,
-    /// Elastic joints: index, stiffness, damping.
+    /// Elastic joints, each with index, stiffness and damping.
     pub elastic: Vec<(usize, S, S)>,
     pub(super) on_pairs: Vec<OnPair<S>>,
     pub(super) on_arm: Vec<Own<S>>,
@@ -31,18 +31,18 @@ pub struct Plant<S> {
 }
 
 impl<S: Scalar> Plant<S> {
-    /// Number of states: `[phi, q, phi', q']`, then those of the effects.
+    /// Number of states: `[phi, q, phi', q']`, then the states of the effects.
     pub fn n_states(&self) -> usize {
         2 * self.n_angles() + self.n_internal
     }
 
-    /// Number of angles, motors' and joints', at the front of the state; as many rates follow.
+    /// Number of angles of motors and joints at the start of the state. As many rates follow.
     pub fn n_angles(&self) -> usize {
         self.n_motors + self.chain.len()
     }
 
-    /// Whether the arm may be linearised along a run: it stands on the ground, and every motor
-    /// is behind a compliant gear, so that no command makes a joint jump.
+    /// Whether the arm may be linearised along a run. It must stand on the ground, and every motor
+    /// must be behind a compliant gear, so that no command makes a joint jump.
     pub fn follows_courses(&self) -> bool {
         self.n_base == 0 && self.axes.iter().all(|axis| axis.gear.is_some())
     }
@@ -74,7 +74,8 @@ impl<S: Scalar> Plant<S> {
         x[self.n_motors + axis.joint]
     }
 
-    /// What effects between axes add in the states that `state` tells of each axis: their axes, the torques.
+    /// Torques of the effects between axes, each with its two axes; `state` gives the state of an
+    /// axis.
     pub fn between_axes(
         &self,
         state: impl Fn(usize) -> CoupledAxis<S>,
@@ -87,14 +88,15 @@ impl<S: Scalar> Plant<S> {
         })
     }
 
-    /// Whether what moves the arm, or its links, carries derivatives.
+    /// Whether the links, or the couplings that move the arm, carry derivatives.
     pub fn arm_carries_derivatives(&self) -> bool {
         let seeded = |by: &S| (0..S::PARTIALS).any(|seed| by.partial(seed, 0) != 0.0);
         let mut turned = self.axes.iter().flat_map(|axis| &axis.led_by);
         self.chain.carries_derivatives() || turned.any(|lead| seeded(&lead.by))
     }
 
-    /// By how much the controller's clock is fast against that of the references; `None` for one clock.
+    /// Relative error of the controller's clock, positive if fast compared with the references;
+    /// `None` if both use one clock.
     pub fn clock_drift(&self) -> Option<S> {
         let drifts = self.on_arm.iter().filter_map(|on| on.kernel.clock_drift());
         drifts.reduce(|a, b| a + b)
@@ -105,7 +107,8 @@ impl<S: Scalar> Plant<S> {
         self.axes.get(axis)?.gear.as_ref().map(|gear| gear.slot)
     }
 
-    /// Per axis, the state that carries its motor angle, and the motor angle per unit of it.
+    /// For each axis, the state that gives its motor angle, and the motor angle per unit of that
+    /// state.
     pub fn motor_slots(&self) -> Vec<(usize, f64)> {
         let slot = |axis: &Axis<S>| match &axis.gear {
             Some(gear) => (gear.slot, 1.0),
@@ -124,8 +127,10 @@ impl<S: Scalar> Plant<S> {
         &x[self.joint_slots()]
     }
 
-    /// `dx = f(x, tau)`: `applied` is the torque the drives deliver, `command`
-    /// the commanded torque of the sample (torque ripple scales with it) [Nm].
+    /// Compute `dx = f(x, tau)`.
+    ///
+    /// `applied` is the torque that the drives deliver [Nm]. `command` is the commanded torque of
+    /// the sample [Nm], with which torque ripple scales.
     #[inline]
     pub fn derivative(
         &self,
@@ -141,8 +146,8 @@ impl<S: Scalar> Plant<S> {
         self.derivative_in_place(x, applied, command, scratch, dx);
     }
 
-    /// [`Plant::derivative`] where only rates, torques and the effects' own states have
-    /// changed since the last evaluation with this `scratch`; about half the work.
+    /// [`Plant::derivative`] if only rates, torques and the effects' own states have changed since
+    /// the last evaluation with this `scratch`. It takes about half the work.
     #[inline]
     pub fn derivative_in_place(
         &self,
@@ -157,7 +162,7 @@ impl<S: Scalar> Plant<S> {
         let (angles, rates) = state.split_at(m + n);
         let (q, v) = (&angles[m..], &rates[m..]);
         self.dynamics.add_rates(v, scratch);
-        // The force becomes the acceleration below.
+        // `solve` turns this force into the acceleration in place.
         let force = scratch.forces();
         for f in force.iter_mut() {
             *f = -*f;
@@ -193,8 +198,8 @@ impl<S: Scalar> Plant<S> {
         place[m + n + m..].copy_from_slice(&scratch.forces()[..n]);
     }
 
-    /// Whether the torques of the drives enter the motors' accelerations only, and as they are:
-    /// then [`Plant::change_torque`] replaces an evaluation.
+    /// Whether the torques of the drives enter only the accelerations of the motors, and unchanged.
+    /// Then [`Plant::change_torque`] replaces an evaluation.
     pub fn torque_acts_on_motors_alone(&self) -> bool {
         self.axes.iter().all(|axis| {
             let plain = |on: &Own<S>| !on.kernel.uses_command();
@@ -202,8 +207,9 @@ impl<S: Scalar> Plant<S> {
         })
     }
 
-    /// Turn a derivative under torques `from` into that under `to` in the same state, where
-    /// [`Plant::torque_acts_on_motors_alone`].
+    /// Change a derivative under the torques `from` to that under `to`, in the same state.
+    ///
+    /// Valid only if [`Plant::torque_acts_on_motors_alone`].
     #[inline]
     pub fn change_torque(&self, from: &[S], to: &[S], dx: &mut [S]) {
         let first = self.n_motors + self.chain.len();
@@ -219,7 +225,7 @@ impl<S: Scalar> Plant<S> {
         self.dynamics.scratch()
     }
 
-    /// Motors behind rigid gears turn with their joints.
+    /// Factorize the inertia matrix, including the motors behind rigid gears.
     fn factorize_inertia(&self, scratch: &mut DynamicsScratch<S>) {
         for axis in self.axes.iter().filter(|axis| axis.gear.is_none()) {
             let up = 1.0 / axis.ratio;
@@ -243,7 +249,8 @@ impl<S: Scalar> Plant<S> {
         }
     }
 
-    /// Torques of an axis; rates of the effects' own states go where there is room for them.
+    /// Torques of an axis. Rates of the effects' own states are written only if `own_rates` has
+    /// room for them.
     #[inline(always)]
     fn driven(
         &self,
@@ -311,7 +318,7 @@ impl<S: Scalar> Plant<S> {
         }
     }
 
-    /// What motors feel of the gears they turn along [Nm]: `take(axis, torque against it)`.
+    /// Call `take(axis, torque)` with the torque [Nm] against each motor that turns another gear.
     #[inline]
     fn each_reaction(&self, x: &[S], mut take: impl FnMut(usize, S)) {
         for second in self.axes.iter().filter(|axis| !axis.led_by.is_empty()) {
@@ -323,7 +330,7 @@ impl<S: Scalar> Plant<S> {
         }
     }
 
-    /// Take a torque off a motor.
+    /// Subtract a torque from a motor.
     fn hold_back(&self, axis: usize, torque: S, force: &mut [S], accelerations: &mut [S]) {
         let axis = &self.axes[axis];
         if let Some(gear) = &axis.gear {
@@ -373,8 +380,8 @@ impl<S: Scalar> Plant<S> {
 struct Driven<S> {
     /// Torque on the motor, without the gear.
     motor: S,
-    /// Gear torque on the joint side.
+    /// Gear torque, joint side.
     gear: S,
-    /// What the motor feels of it.
+    /// Gear torque on the motor, motor side.
     load: S,
 }

@@ -1,4 +1,4 @@
-//! Static equilibrium: elastic joints settled under gravity, motors holding.
+//! Static equilibrium: elastic joints settled under gravity, motors holding the arm.
 
 use super::axis::Axis;
 use super::equations::Plant;
@@ -8,31 +8,31 @@ use axisight_scalar::Scalar;
 /// A plant at rest.
 #[derive(Debug, Clone)]
 pub struct Equilibrium<S> {
-    /// Angles of joints that effects put below the first one [rad].
+    /// Angles of the joints that effects put below the first one [rad].
     pub base_angle: Vec<S>,
     /// Angles of the robot's joints [rad].
     pub joint_angle: Vec<S>,
     /// Motor angles [rad].
     pub motor_angle: Vec<S>,
-    /// Torque command that holds the arm, effects of the torque path included [Nm].
+    /// Torque command that holds the arm, including effects of the torque path [Nm].
     pub motor_torque: Vec<S>,
 }
 
-/// Why no equilibrium was found.
+/// Reason why no equilibrium was found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EquilibriumError {
     /// Wrong number of driven joint angles.
     #[error("joint_angle: expected {expected} driven joint angles, got {got}")]
     Shape {
-        /// Driven joints.
+        /// Number of driven joints.
         expected: usize,
-        /// Angles given.
+        /// Number of given angles.
         got: usize,
     },
     /// A gear cannot carry its static load, or a parameter is not finite.
     #[error("axis {axis}: expected a gear that carries its static load, got no finite deflection")]
     NoDeflection {
-        /// Driven axis, from 1.
+        /// Driven axis, counted from 1.
         axis: usize,
     },
     /// The elastic joints do not settle.
@@ -65,14 +65,15 @@ impl<S: Scalar> Plant<S> {
 
 const MAX_ITERATIONS: usize = 200;
 
-/// Equilibrium with the driven joints at `driven` [rad].
+/// Static equilibrium with the driven joints at `driven` [rad].
 ///
-/// Fixed-point iteration `q_e = -K_e^-1 g_e(q)`; it contracts by the ratio of
-/// gravity stiffness to spring stiffness (1e-3 on the nominal robot), and
-/// derivatives carried by the scalar converge at the same rate.
+/// The fixed-point iteration `q_e = -K_e^-1 g_e(q)` contracts by the ratio of gravity stiffness to
+/// spring stiffness (1e-3 on the nominal robot). Derivatives carried by the scalar converge at the
+/// same rate.
 ///
 /// # Errors
-/// [`EquilibriumError`] for a wrong shape or springs too soft to settle.
+/// [`EquilibriumError`] if the number of angles is wrong, a gear cannot carry its static load, or
+/// the springs are too soft to settle.
 #[inline(never)]
 pub fn equilibrium<S: Scalar>(
     plant: &Plant<S>,
@@ -96,7 +97,7 @@ pub fn equilibrium<S: Scalar>(
         let mut load = plant.dynamics.evaluate(&q, &rest).bias;
         relieve(plant, &q, &rest, &mut load);
         change = settle_step(plant, &load, &mut q);
-        // One more iteration once the value is settled, for the derivatives.
+        // Derivatives settle later than values, so three settled iterations are required.
         settled_for = if change < 1e-16 { settled_for + 1 } else { 0 };
         if settled_for == 3 {
             return hold(plant, &q, &load);
@@ -105,7 +106,7 @@ pub fn equilibrium<S: Scalar>(
     Err(EquilibriumError::NotSettled { change })
 }
 
-/// What effects of the arm carry of the load on its joints.
+/// Subtract from the load on the joints what the effects of the arm carry.
 fn relieve<S: Scalar>(plant: &Plant<S>, q: &[S], rest: &[S], load: &mut [S]) {
     let mut force = rest.to_vec();
     for on_arm in &plant.on_arm {
@@ -127,7 +128,7 @@ fn settle_step<S: Scalar>(plant: &Plant<S>, load: &[S], q: &mut [S]) -> f64 {
         let next = -(load[*joint] / *stiffness);
         for lane in 0..S::LANES {
             let change = (next.lane(lane) - q[*joint].lane(lane)).abs();
-            // A NaN must not pass for settled.
+            // A NaN must not count as settled.
             largest = if change.is_nan() {
                 f64::INFINITY
             } else {
@@ -139,8 +140,8 @@ fn settle_step<S: Scalar>(plant: &Plant<S>, load: &[S], q: &mut [S]) -> f64 {
     largest
 }
 
-/// Passes over the effects between axes: what they add moves the motors by the compliance of
-/// the gears alone, so each pass gains several digits.
+/// Number of iterations over the effects between axes. Their torques move the motors only by the
+/// compliance of the gears, so each iteration gains several digits.
 const PAIR_PASSES: usize = 20;
 
 fn hold<S: Scalar>(
@@ -167,8 +168,10 @@ fn hold<S: Scalar>(
     })
 }
 
-/// Motor angles and torque commands that hold the joints; `added` is what effects between axes
-/// add, `motors` are the angles [rad] of the pass before.
+/// Motor angles and torque commands that hold the joints.
+///
+/// `added` are the torques of effects between axes, `motors` the motor angles [rad] of the previous
+/// iteration.
 fn hold_axes<S: Scalar>(
     plant: &Plant<S>,
     q: &[S],
@@ -202,7 +205,7 @@ fn gear_load<S: Scalar>(axis: &Axis<S>, q: &[S], load: &[S]) -> S {
     load[axis.joint] - axis.joint_torque_of(q[axis.joint], S::zero())
 }
 
-/// Take off each motor what it carries of the gears that it turns along.
+/// Subtract from each motor the load of the other gears that it turns.
 fn add_reactions<S: Scalar>(plant: &Plant<S>, q: &[S], load: &[S], added: &mut [AxisTorque<S>]) {
     for (second, axis) in plant.axes.iter().enumerate() {
         let torque = gear_load(axis, q, load) - added[second].joint;

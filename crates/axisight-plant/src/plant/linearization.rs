@@ -6,16 +6,17 @@ use super::equilibrium::{Equilibrium, EquilibriumError, equilibrium};
 use axisight_scalar::{Dual, Scalar};
 use nalgebra::DMatrix;
 
-/// Seeds per pass; eight partials fill two vector registers.
+/// Seeds per pass. Eight partials fill two vector registers.
 pub(crate) const WIDTH: usize = 8;
 /// A number with derivatives along [`WIDTH`] states.
 pub type Seeded = Dual<f64, WIDTH>;
 type D = Seeded;
 
-/// `x' = A x + B u`, `phi = C x` around an equilibrium; states `[phi, q, phi', q']`.
+/// Linear model `x' = A x + B u`, `phi = C x` about an equilibrium, with states
+/// `[phi, q, phi', q']`.
 ///
-/// `u` is the torque the drives deliver: effects of the torque path (gain, delay,
-/// lag) come before it and are not in `B`.
+/// `u` is the torque that the drives deliver. Effects of the torque path (gain, delay, lag) come
+/// before it and are not in `B`.
 #[derive(Debug, Clone)]
 pub struct Linearization {
     /// State matrix, `(n_states, n_states)`.
@@ -24,23 +25,24 @@ pub struct Linearization {
     pub b: DMatrix<f64>,
     /// Output matrix to motor angle [rad], `(n_axes, n_states)`.
     pub c: DMatrix<f64>,
-    /// Where the plant was linearized.
+    /// Operating point of the linearization.
     pub equilibrium: Equilibrium<f64>,
 }
 
-/// Why a robot cannot be linearized.
+/// Reason why a robot cannot be linearized.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LinearizationError {
     /// The plant cannot be built.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// No equilibrium.
+    /// No equilibrium was found.
     #[error(transparent)]
     Equilibrium(#[from] EquilibriumError),
 }
 
-/// Linearize a plant, given as it is and over dual numbers, at rest with the driven joints at
-/// `driven` [rad].
+/// Linearize a plant at rest with the driven joints at `driven` [rad].
+///
+/// `plain` and `seeded` are the same plant over plain and over dual numbers.
 ///
 /// # Errors
 /// [`LinearizationError`] if the plant does not settle.

@@ -1,5 +1,5 @@
-//! The plant: motors, gears and the elastic arm with the effects on them, as equations of
-//! motion; its equilibrium and its linearization.
+//! The plant: equations of motion of motors, gears and the elastic arm with its effects, its
+//! equilibrium and its linearization.
 
 mod axis;
 mod build;

@@ -1,10 +1,10 @@
-//! Effects at their places in a plant, with the states they have of their own.
+//! Effects at their places in a plant, with their own states.
 
 use crate::effect::Kernel;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// An effect, and its own states among those of all effects.
+/// An effect, with the range of its own states among those of all effects.
 #[derive(Clone)]
 pub(super) struct Own<S> {
     pub(super) kernel: Arc<dyn Kernel<S>>,

@@ -3,11 +3,11 @@
 use super::linearization::Linearization;
 use nalgebra::{Complex, DMatrix};
 
-/// Response `G(e^{i w T}) = C (e^{i w T} I - A_d)^-1 B_d` from motor torque to
-/// motor angle for a torque held over each sample; `(frequency, output, input)`.
+/// Response `G(e^{i w T}) = C (e^{i w T} I - A_d)^-1 B_d` from motor torque to motor angle,
+/// `(frequency, output, input)`, for a torque held over each sample.
 ///
-/// The true response of a sampled loop is this one, not `G(i w)`. Returns
-/// `None` in the place of a frequency that hits a pole.
+/// A sampled loop has this response, not `G(i w)`. The result is `None` at a frequency that hits a
+/// pole.
 pub fn zoh_frequency_response(
     linear: &Linearization,
     sample_time: f64,

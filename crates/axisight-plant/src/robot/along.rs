@@ -1,23 +1,23 @@
-//! The arm along a run, as the integrators call it; how a run is linearised stands in `course`.
+//! The arm linearised along a run, as the integrators call it. See `course` for the linearization.
 
 use super::chain::Chain;
 use axisight_scalar::Scalar;
 use std::sync::Arc;
 
-/// Samples over which forces of other masses are taken as straight lines.
+/// Samples over which the forces of changed masses are interpolated linearly.
 pub(super) const FORCING_STRIDE: usize = 2;
 
-/// A run, and the arm linearised along it.
+/// A run with the arm linearised along it.
 #[derive(Debug, Clone)]
 pub struct Course<R> {
     pub(super) chain: Chain<R>,
     pub(super) sample_time: f64,
     pub(super) samples: usize,
-    /// By sample: angles, rates, bias forces.
+    /// For each sample: angles, rates, bias forces.
     pub(super) motion: Vec<R>,
-    /// Samples from node to node.
+    /// Number of samples between nodes.
     pub(super) stride: usize,
-    /// By node: inverse of the inertia matrix, `B_q`, `B_v`, row-major.
+    /// For each node: inverse of the inertia matrix, `B_q`, `B_v`, row-major.
     pub(super) nodes: Vec<R>,
 }
 
@@ -43,29 +43,29 @@ impl<R: Scalar> Course<R> {
 #[derive(Debug, Clone)]
 pub struct Along<S: Scalar> {
     pub(super) course: Arc<Course<S::Real>>,
-    /// By node of [`FORCING_STRIDE`] samples.
+    /// Forces of changed masses, for each node of [`FORCING_STRIDE`] samples.
     pub(super) forcing: Option<Vec<S>>,
     pub(super) sample: usize,
-    /// Fraction of the sample.
+    /// Time within the sample, as a fraction.
     pub(super) at: f64,
-    /// In the middle of the sample: inverse of the inertia matrix, `B_q`, `B_v`.
+    /// Inverse of the inertia matrix, `B_q`, `B_v` in the middle of the sample.
     pub(super) matrices: Vec<S::Real>,
     /// `q - q0`.
     pub(super) off: Vec<S>,
-    /// `B_q (q - q0) + B_v (v - v0)` at the start of the sample: against a gear spring a
-    /// thousandth, and it changes little until the next.
+    /// `B_q (q - q0) + B_v (v - v0)` at the start of the sample. It is a thousandth of a gear
+    /// spring's force and changes little until the next sample.
     pub(super) held: Vec<S>,
     pub(super) is_held: bool,
     pub(super) copy: Vec<S>,
 }
 
 impl<S: Scalar> Along<S> {
-    /// Number of samples the course has.
+    /// Number of samples of the course.
     pub fn samples(&self) -> usize {
         self.course.samples
     }
 
-    /// Go to a sample.
+    /// Move to a sample.
     pub fn enter(&mut self, sample: usize) {
         self.sample = sample;
         self.is_held = false;
@@ -73,7 +73,7 @@ impl<S: Scalar> Along<S> {
         let node = sample / course.stride;
         let share = ((sample % course.stride) as f64 + 0.5) / course.stride as f64;
         let share = S::Real::constant(share);
-        // A run without samples has none; it is refused before the first step.
+        // A run without samples has no nodes. It is refused before the first step.
         let Some(pair) = course.nodes.get(node * size..(node + 2) * size) else {
             return;
         };
@@ -83,13 +83,13 @@ impl<S: Scalar> Along<S> {
         }
     }
 
-    /// Go to a fraction of the sample.
+    /// Move to a fraction of the sample.
     #[inline(always)]
     pub fn go_to(&mut self, at: f64) {
         self.at = at;
     }
 
-    /// A part of the motion at the present instant.
+    /// A part of the run's motion (0: angles, 1: rates, 2: bias forces) at the present time.
     #[inline(always)]
     fn motion(&self, which: usize) -> impl Iterator<Item = S::Real> {
         let at = S::Real::constant(self.at);
@@ -98,7 +98,7 @@ impl<S: Scalar> Along<S> {
         from.iter().zip(to).map(move |(a, b)| (*b - *a).fma(at, *a))
     }
 
-    /// Take joint angles.
+    /// Set the joint angles.
     #[inline(always)]
     pub(super) fn place(&mut self, q: &[S]) {
         if !self.is_held {
@@ -108,14 +108,14 @@ impl<S: Scalar> Along<S> {
         }
     }
 
-    /// `out = x - x0` for a part of the motion.
+    /// Compute `out = x - x0` for a part of the run's motion.
     fn subtract(&self, which: usize, x: &[S], out: &mut [S]) {
         for ((out, x), on) in out.iter_mut().zip(x).zip(self.motion(which)) {
             *out = *x - S::from_real(on);
         }
     }
 
-    /// Forces without acceleration at rates `v` and the angles last placed.
+    /// Forces without acceleration, at rates `v` and the angles set last.
     #[inline(always)]
     pub(super) fn bias(&mut self, v: &[S], out: &mut [S]) {
         if !self.is_held {
@@ -136,7 +136,7 @@ impl<S: Scalar> Along<S> {
         }
     }
 
-    /// What being off the run takes at rates `v`.
+    /// Compute the forces of the distance from the run, at rates `v`.
     fn hold(&mut self, v: &[S]) {
         let n = self.off.len();
         let mut faster = std::mem::take(&mut self.copy);
@@ -158,7 +158,7 @@ impl<S: Scalar> Along<S> {
         self.is_held = true;
     }
 
-    /// Forces to accelerations.
+    /// Replace forces by accelerations.
     #[inline(always)]
     pub(super) fn accelerate(&mut self, force: &mut [S]) {
         let n = self.copy.len();

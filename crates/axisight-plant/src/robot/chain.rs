@@ -25,18 +25,18 @@ impl<S: Scalar> From<&Link> for Body<S> {
     }
 }
 
-/// One joint and the link it moves.
+/// One joint with the link that it moves.
 #[derive(Debug, Clone)]
 pub struct ChainJoint<S> {
-    /// How the joint moves.
+    /// Kind of motion of the joint.
     pub motion: Motion,
     /// Position in the parent link's frame [m]; `None` is its origin.
     pub origin: Option<[f64; 3]>,
-    /// By how much it lies elsewhere there [m]; `None` is nothing.
+    /// Change of the position in the parent link's frame [m]; `None` for no change.
     pub shift: Option<[S; 3]>,
     /// Unit vector of the axis in the parent link's frame.
     pub axis: [f64; 3],
-    /// Angle [rad] or shift [m] that the joint has where it counts zero.
+    /// Angle [rad] or displacement [m] of the joint at its zero reading.
     pub zero: S,
     /// Mass properties of the link; `None` is massless.
     pub body: Option<Body<S>>,
@@ -88,7 +88,7 @@ impl<S: Scalar> Chain<S> {
         }
     }
 
-    /// The same chain over another scalar whose numbers without derivatives these are.
+    /// The same chain over a scalar `D` whose plain numbers are `S`.
     pub fn lifted<D: Scalar<Real = S>>(&self) -> Chain<D> {
         let body = |b: &Body<S>| Body {
             mass: D::from_real(b.mass),
@@ -109,8 +109,8 @@ impl<S: Scalar> Chain<S> {
         }
     }
 
-    /// Whether gravity, zeros and shifts of joints and all masses are those of `other` bit for bit,
-    /// derivatives aside.
+    /// Whether gravity, joint zeros, joint shifts and all masses equal those of `other` bit for
+    /// bit, without regard to derivatives.
     pub fn same_masses(&self, other: &Chain<S::Real>) -> bool {
         let same =
             |a: &S, b: &S::Real| (0..S::LANES).all(|l| a.lane(l).to_bits() == b.lane(l).to_bits());
@@ -143,7 +143,7 @@ impl<S: Scalar> Chain<S> {
         self.joints.is_empty()
     }
 
-    /// Whether anything here depends on a seed.
+    /// Whether any number of the chain carries derivatives.
     pub fn carries_derivatives(&self) -> bool {
         let depends = |x: &S| {
             (0..S::PARTIALS).any(|seed| (0..S::LANES).any(|lane| x.partial(seed, lane) != 0.0))

@@ -1,14 +1,14 @@
-//! The arm along a run: its equations of motion linearised about a motion in time.
+//! Equations of motion of the arm, linearised about a run.
 //!
-//! With angles, rates and accelerations `q0, v0, a0` of the run and `h = M(q) a0 + c(q, v)`,
-//! `M(q0) q'' = F - [c(q0, v0) + p + B_q (q - q0) + B_v (v - v0)]`, where `B_q` and `B_v` are the
-//! derivatives of `h` on the run, and `p` are the forces that an arm of other masses needs on the
-//! run beyond those of the arm itself. What is left out is of second order in the distance from
-//! the run and in the change of the masses. Everything but the arm (motors, gears, effects) stays
-//! as nonlinear as it is.
+//! Let `q0, v0, a0` be the angles, rates and accelerations of the run, and `h = M(q) a0 + c(q, v)`.
+//! Then `M(q0) q'' = F - [c(q0, v0) + p + B_q (q - q0) + B_v (v - v0)]`. `B_q` and `B_v` are the
+//! derivatives of `h` on the run. `p` are the additional forces that an arm of other masses needs
+//! on the run. The neglected terms are of second order in the distance from the run and in the
+//! change of the masses. Everything but the arm (motors, gears, effects) stays nonlinear.
 //!
-//! For `n` joints an evaluation takes `n^2` multiplications, `2 n^2` more once a sample, all by
-//! numbers without derivatives; the equations themselves take about `30 n^2` with them.
+//! For `n` joints an evaluation takes `n^2` multiplications, and `2 n^2` more once a sample, all by
+//! numbers without derivatives. The full equations take about `30 n^2` multiplications of numbers
+//! with derivatives.
 
 use super::along::{Along, Course, FORCING_STRIDE};
 use super::chain::Chain;
@@ -16,13 +16,13 @@ use super::dynamics::Dynamics;
 use axisight_scalar::{Dual, Scalar};
 use std::sync::Arc;
 
-/// Longest time over which the matrices are taken as straight lines [s].
+/// Longest time over which the matrices are interpolated linearly [s].
 const LONGEST_STRIDE_S: f64 = 8e-3;
-/// Derivatives at a time.
+/// Number of derivatives per evaluation.
 const SEEDS: usize = 4;
 
 impl<R: Scalar> Course<R> {
-    /// Of a run of the arm `chain`: `states` holds its joint angles and rates sample by sample.
+    /// A course for the arm `chain`; `states` holds the joint angles and rates of each sample.
     pub fn new(chain: &Chain<R>, sample_time: f64, states: &[R]) -> Self {
         let n = chain.len();
         let dynamics = Dynamics::new(chain);
@@ -51,7 +51,7 @@ impl<R: Scalar> Course<R> {
         course
     }
 
-    /// Accelerations at a sample, from the rates on either side.
+    /// Accelerations at a sample, from the rates of its neighbours.
     fn acceleration(&self, sample: usize) -> Vec<R> {
         let (before, after) = (sample.saturating_sub(1), (sample + 1).min(self.samples - 1));
         let time = (after - before).max(1) as f64 * self.sample_time;
@@ -67,7 +67,7 @@ impl<R: Scalar> Course<R> {
         let lifted = Dynamics::new(&self.chain.lifted::<Dual<R, SEEDS>>());
         let (mut plain, mut dual) = (dynamics.scratch(), lifted.scratch());
         let mut force = vec![Dual::<R, SEEDS>::zero(); n];
-        // One node beyond the last sample, for the straight line to it.
+        // One node after the last sample, for the interpolation up to it.
         for node in 0..=self.samples.div_ceil(self.stride) {
             let sample = (node * self.stride).min(self.samples - 1);
             let (q, v) = (self.part(sample, 0), self.part(sample, 1));
@@ -109,8 +109,8 @@ impl<R: Scalar> Course<R> {
         }
     }
 
-    /// Forces that `chain` needs on the run beyond those of the run's own arm, node by node;
-    /// `None` for the same arm, or without a run.
+    /// Forces that `chain` needs on the run, minus those of the run's own arm, node by node. `None`
+    /// for the same arm or an empty run.
     fn forcing<S: Scalar<Real = R>>(&self, chain: &Chain<S>) -> Option<Vec<S>> {
         let same = !chain.carries_derivatives() && chain.same_masses(&self.chain);
         if same || self.samples == 0 {

@@ -1,12 +1,12 @@
-//! What a robot is: a serial chain of joints, links and drives, in SI units.
+//! Description of a robot: a serial chain of joints, links and drives, in SI units.
 //!
-//! The checks here are physical and know nothing of files; the reader of robot files
-//! runs them and says where in the file the fault lies.
+//! The checks here are physical and independent of files. The reader of robot files runs them and
+//! reports the place of an error in the file.
 
 use super::setting::EffectSetting;
 use std::sync::Arc;
 
-/// How a joint moves.
+/// Kind of motion of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Motion {
     /// Turns about its axis; angles in rad, torques in Nm.
@@ -68,7 +68,7 @@ pub struct Joint {
     pub drive: Option<Drive>,
 }
 
-/// Controller of the robot, one gain per driven joint, motor side.
+/// Controller of the robot, with one gain per driven joint, motor side.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Controller {
     /// `u = u_ff + kp (w_ref - w) + ki (phi_ref - phi)`.
@@ -91,52 +91,54 @@ pub enum Controller {
         kp: Vec<f64>,
         /// Integral gain of the velocity error, zero for a velocity P loop [Nm/rad].
         ki: Vec<f64>,
-        /// `None` where it is told speeds; where it is told positions, whether their rate is the
-        /// reference of speed, which is zero otherwise.
+        /// Kind of the references: `None` for speeds, `Some` for positions. With positions, the
+        /// value says whether the rate of the positions is the speed reference; otherwise that
+        /// reference is zero.
         told_positions: Option<bool>,
     },
-    /// Targets are positions: `u = u_ff + kp (phi_ref - phi) + kd (w_ref - w)`.
+    /// PD control of position: `u = u_ff + kp (phi_ref - phi) + kd (w_ref - w)`.
     PdPosition {
         /// Position gain [Nm/rad].
         kp: Vec<f64>,
         /// Velocity gain [Nm s/rad].
         kd: Vec<f64>,
-        /// Whether the rate of the targets is `w_ref`; zero where it is not.
+        /// Whether `w_ref` is the rate of the position references; otherwise it is zero.
         feeds_speed: bool,
-        /// Whether the law holds between samples, too: an actuator in a simulator, or a drive much faster
-        /// than the sample time.
+        /// Whether the law also acts between samples, as in an actuator of a simulator or a drive
+        /// that is much faster than the sample time.
         continuous: bool,
-        /// The robot as the controller knows it; `u_ff` is constant without one. What is fitted of a
-        /// machine changes nothing of it.
+        /// Robot model of the controller; without one, `u_ff` is constant. Fits do not change this
+        /// model.
         known: Option<Known>,
-        /// The simulator that holds the law; none where it is a machine.
+        /// Simulator that executes the law; `None` for a real machine.
         stepped: Option<Stepped>,
     },
     /// No controller: logs are torque-driven only.
     None,
 }
 
-/// What a controller does with a robot that it knows, joints rigid.
+/// How a controller uses its robot model, which has rigid joints.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Known {
     /// `u_ff` follows the gravity torque at the measured pose.
     Gravity(Arc<RobotDescription>),
-    /// Computed torque: gains [1/s^2] and [1/s] make accelerations of errors, to which that of the
-    /// targets is added; `u` is what gives the robot these, with `c(q, q') + g(q)` as measured.
+    /// Computed torque. The gains [1/s^2] and [1/s] turn errors into accelerations, and the
+    /// acceleration of the references is added. `u` is the torque for this acceleration, with
+    /// `c(q, q') + g(q)` at the measured motion.
     Dynamics(Arc<RobotDescription>),
 }
 
-/// What the steps of a simulator make of a law that it holds: forces act around the beginning of a step.
+/// How the steps of a simulator change a control law: forces act around the start of a step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stepped {
-    /// Step [s]: a target acts from half of it before.
+    /// Step [s]. A reference acts from half a step earlier.
     pub step: f64,
-    /// What its treatment of damping adds to the inertia of each motor [kg m^2].
+    /// Inertia that the simulator's treatment of damping adds to each motor [kg m^2].
     pub inertia: Vec<f64>,
 }
 
 impl Controller {
-    /// Whether it is told positions.
+    /// Whether the references are positions.
     pub fn has_targets(&self) -> bool {
         match self {
             Self::PdPosition { .. } => true,
@@ -145,8 +147,8 @@ impl Controller {
         }
     }
 
-    /// The same controller for a loop `factor` times as fast: damping torque with the factor,
-    /// stiffness torque with its square.
+    /// The same controller for a loop that is `factor` times as fast: damping gains grow with the
+    /// factor, stiffness gains with its square.
     #[must_use]
     pub fn at_speed(&self, factor: f64) -> Self {
         let scaled = |gains: &[f64], by: f64| gains.iter().map(|g| g * by).collect();
@@ -189,7 +191,7 @@ impl Controller {
     }
 }
 
-/// A serial robot, base to tip.
+/// A serial robot, from base to tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotDescription {
     /// Name for people.
@@ -207,9 +209,9 @@ pub struct RobotDescription {
     /// Angles of the driven joints at the operating point, in chain order
     /// [rad; m if prismatic].
     pub operating_point: Vec<f64>,
-    /// Effects that the simulator of this robot has.
+    /// Effects that the robot's own simulator includes.
     pub effects: Vec<EffectSetting<f64>>,
-    /// Relative standard deviation of the robot's own parameters by quantity, where stated.
+    /// Relative tolerance of the robot's own parameters by quantity, if stated.
     pub tolerances: Vec<(String, f64)>,
 }
 
@@ -228,7 +230,7 @@ impl RobotDescription {
             .filter_map(|(i, joint)| joint.drive.as_ref().map(|drive| (i, joint, drive)))
     }
 
-    /// The robot's own effects that none of `settings` replaces.
+    /// The robot's own effects, without those that `settings` replaces.
     pub fn effects_beside<S>(
         &self,
         settings: &[EffectSetting<S>],
@@ -237,8 +239,9 @@ impl RobotDescription {
         self.effects.iter().filter(kept)
     }
 
-    /// The robot without effects of its own, and all effects that act when `settings` are
-    /// added to its own.
+    /// The robot without effects, and the list of its own effects together with `settings`.
+    ///
+    /// A setting replaces the robot's own effect of the same name and place.
     #[must_use]
     pub fn with_all_effects(
         &self,
@@ -258,8 +261,8 @@ impl RobotDescription {
         self.driven().count()
     }
 
-    /// The last joint that moves no inertia at all, which would make the
-    /// inertia matrix singular in every pose.
+    /// The last joint that moves no inertia, if any. Such a joint makes the inertia matrix singular
+    /// in every pose.
     pub fn joint_without_inertia(&self) -> Option<usize> {
         let last_mass = self.joints.iter().rposition(|joint| joint.link.is_some());
         let singular = self
@@ -282,8 +285,7 @@ impl RobotDescription {
 }
 
 impl Joint {
-    /// Whether the joint moves a mass of its own, or a rotor through a rigid
-    /// transmission.
+    /// Whether the joint moves its own mass, or a rotor through a rigid transmission.
     fn carries_inertia(&self) -> bool {
         let has_rotor = |drive: &Drive| drive.motor_inertia > 0.0;
         let rigid = self.compliance.is_none();
@@ -291,7 +293,7 @@ impl Joint {
     }
 }
 
-/// What a number may be, beyond finite.
+/// Allowed range of a finite number.
 #[derive(Debug, Clone, Copy)]
 pub enum Bound {
     /// Any sign.
@@ -316,7 +318,7 @@ impl Bound {
             }
     }
 
-    /// The bound in words, for "expected ...".
+    /// The bound in words, for messages with "expected ...".
     pub fn describe(self, unit: &str) -> String {
         let kind = match self {
             Self::Any => "a finite number",
@@ -328,10 +330,10 @@ impl Bound {
     }
 }
 
-/// Whether a vector is of unit length to `tolerance`; if not, its length.
+/// Check that a vector is of unit length to `tolerance`.
 ///
 /// # Errors
-/// The length that is not one.
+/// The actual length.
 pub fn check_unit(axis: &[f64; 3], tolerance: f64) -> Result<(), f64> {
     let [x, y, z] = *axis;
     let norm = x.hypot(y).hypot(z);
@@ -353,6 +355,6 @@ pub fn is_positive_definite(matrix: &[f64; 6]) -> bool {
     let second = yy - xy / xx * xy;
     let coupling = yz - xy / xx * xz;
     let third = zz - xz / xx * xz - coupling / second * coupling;
-    // Written so that a NaN pivot, from a zero one before it, fails as well.
+    // In this form, a NaN pivot after a zero pivot also fails.
     [xx, second, third].iter().all(|pivot| *pivot > rounding)
 }

@@ -1,16 +1,19 @@
-//! The chain's equations of motion in the form the integrators call: hot, and nothing else.
+//! Equations of motion of the chain, as the integrators call them.
 //!
-//! What depends on the joint angles alone comes first: joint axes, masses and the inertia
-//! matrix (composite rigid bodies). The rates then give bias forces (recursive Newton-Euler),
-//! as often as they change at the same angles. Featherstone (2008), *Rigid Body Dynamics
-//! Algorithms*, chapters 5 and 6. All of it is in base-frame axes about the base origin, so
-//! that sums, crosses and inner products are all that is left of it. Massless links and
-//! coinciding joints, common in elastic robot models, are skipped. The nominal robot
-//! (7 joints, 3 bodies) takes about 1,400 multiply-adds, 350 of them for the rates.
+//! The terms that depend on the joint angles alone come first: joint axes, masses and the inertia
+//! matrix (composite rigid bodies). The rates then give the bias forces (recursive Newton-Euler),
+//! which can be evaluated again at the same angles. The method is that of Featherstone (2008),
+//! *Rigid Body Dynamics Algorithms*, chapters 5 and 6.
 //!
-//! Code is made for a few numbers of joints, so that its loops become straight lines; a chain
-//! just below one of them is padded with joints that move nothing. Longer chains, and numbers
-//! with derivatives, whose arithmetic hides the loops, share the code for any number.
+//! All quantities are in base-frame axes about the base origin, so that only sums, cross products
+//! and inner products remain. Massless links and coinciding joints, which are common in elastic
+//! robot models, are skipped. The nominal robot (7 joints, 3 bodies) takes about 1,400
+//! multiply-adds, 350 of them for the rates.
+//!
+//! The code is compiled for a few numbers of joints, so that its loops are unrolled. A chain just
+//! below one of these numbers is padded with joints that move nothing. Longer chains share the code
+//! for any number of joints. So do numbers with derivatives, because their arithmetic takes much
+//! longer than the loops.
 
 mod frame;
 
@@ -22,7 +25,7 @@ use super::linear_algebra::{factorize, solve_factorized};
 use super::vector::{Mat3, Vec3, shift_inertia};
 use axisight_scalar::Scalar;
 
-/// How a joint moves its link, coordinate axes told apart because they cost a third.
+/// How a joint moves its link. Separate cases for coordinate axes save two thirds of the work.
 #[derive(Debug, Clone, Copy)]
 enum Turn {
     X { reversed: bool },
@@ -61,7 +64,7 @@ impl<S: Scalar> Moments<S> {
         }
     }
 
-    /// Of a link about its joint, in link axes.
+    /// Moments of a link about its joint, in link axes.
     fn of(body: &Body<S>) -> Self {
         let com = Vec3(body.com);
         let mut second = body.inertia;
@@ -93,7 +96,7 @@ impl<S: Scalar> Moments<S> {
         }
     }
 
-    /// Refer the moments to a point that lies at `-d` from the present one.
+    /// Refer the moments to the point `-d`, relative to the present point.
     #[inline(always)]
     fn shift(&mut self, d: &Vec3<S>) {
         shift_inertia(&mut self.second, d, &self.first, self.mass);
@@ -101,7 +104,7 @@ impl<S: Scalar> Moments<S> {
     }
 }
 
-/// One joint and the link it moves, ready for the sweeps.
+/// One joint with the link that it moves, prepared for the sweeps.
 #[derive(Debug, Clone)]
 struct Segment<S> {
     turn: Turn,
@@ -123,7 +126,7 @@ impl<S: Scalar> From<&ChainJoint<S>> for Segment<S> {
     }
 }
 
-/// Equations of motion of a chain at its present mass properties.
+/// Equations of motion of a chain with fixed mass properties.
 #[derive(Debug, Clone)]
 pub struct Dynamics<S> {
     gravity: [S; 3],
@@ -159,7 +162,7 @@ impl<S: Scalar> Screw<S> {
         }
     }
 
-    /// `sum +=` the rate at which a motion fixed in a body that moves with `self` turns.
+    /// `sum +=` the rate of change of `motion`, which is fixed in a body that moves with `self`.
     #[inline(always)]
     fn turn_add(&self, motion: &Self, sum: &mut Self) {
         sum.angular = self.angular.cross_add(&motion.angular, &sum.angular);
@@ -167,7 +170,7 @@ impl<S: Scalar> Screw<S> {
         sum.linear = self.linear.cross_add(&motion.angular, &sum.linear);
     }
 
-    /// `sum +=` the same of a momentum or wrench.
+    /// `sum +=` the rate of change of a momentum or wrench that is fixed in such a body.
     #[inline(always)]
     fn turn_momentum_add(&self, momentum: &Self, sum: &mut Self) {
         sum.angular = self.angular.cross_add(&momentum.angular, &sum.angular);
@@ -183,10 +186,10 @@ impl<S: Scalar> Screw<S> {
     }
 }
 
-/// Scratch and results of one evaluation, padded to a compiled size.
+/// Scratch memory and results of one evaluation, padded to a compiled size.
 #[derive(Debug, Clone)]
 pub struct DynamicsScratch<S: Scalar> {
-    /// The run that the arm is linearised along, if it is.
+    /// The run along which the arm is linearised, if any.
     pub(crate) along: Option<Along<S>>,
     /// Inertia matrix M(q): entry (i, j) for `i <= j`, row-major. Padding has unit inertia.
     inertia: Vec<S>,
@@ -195,14 +198,14 @@ pub struct DynamicsScratch<S: Scalar> {
     angles: Vec<S>,
     trigonometry: Vec<(S, S)>,
     axes: Vec<Screw<S>>,
-    /// Of the links, about the base origin in base axes.
+    /// Moments of the links about the base origin, in base axes.
     moments: Vec<Moments<S>>,
     wrenches: Vec<Screw<S>>,
 }
 
-/// The scratch at the size of the code that uses it.
+/// View of the scratch memory with a compiled size.
 struct Sized<'a, S, const N: usize> {
-    /// Joints that count, padding included: `N`, unless the code is made for any number.
+    /// Number of joints, padding included: `N`, unless the code serves any number.
     n: usize,
     inertia: &'a mut [[S; N]; N],
     bias: &'a mut [S; N],
@@ -214,8 +217,8 @@ struct Sized<'a, S, const N: usize> {
 }
 
 impl<S: Scalar> DynamicsScratch<S> {
-    /// Forces on the joints, padding included: bias forces after [`Dynamics::add_rates`],
-    /// accelerations after [`Dynamics::solve`].
+    /// Forces on the joints, padding included. They are bias forces after [`Dynamics::add_rates`]
+    /// and accelerations after [`Dynamics::solve`].
     pub fn forces(&mut self) -> &mut [S] {
         &mut self.bias
     }
@@ -228,7 +231,7 @@ impl<S: Scalar> DynamicsScratch<S> {
         }
     }
 
-    /// For a chain of `len` joints; `None` if the scratch was made for another size.
+    /// View for a chain of `len` joints; `None` if the scratch was made for another size.
     #[inline(always)]
     fn sized<const N: usize>(&mut self, len: usize) -> Option<Sized<'_, S, N>> {
         Some(Sized {
@@ -243,8 +246,8 @@ impl<S: Scalar> DynamicsScratch<S> {
         })
     }
 
-    /// Rows that count, inertia matrix and forces alone: looking at all of it takes as long as
-    /// a solve.
+    /// The number of used rows, the inertia matrix and the forces. A view of the whole scratch
+    /// would take as long as a solve.
     #[inline(always)]
     #[allow(clippy::type_complexity)] // seen twice, ten lines below
     fn system<const N: usize>(
@@ -256,12 +259,12 @@ impl<S: Scalar> DynamicsScratch<S> {
     }
 }
 
-/// Rows of a chain of `len` joints that count, padding included.
+/// Number of used rows for a chain of `len` joints, padding included.
 const fn rows<const N: usize>(len: usize) -> usize {
     if N == MOST_JOINTS { len } else { N }
 }
 
-/// Inertia matrix and bias forces for callers that are in no hurry.
+/// Inertia matrix and bias forces, for callers outside of the integrators.
 #[derive(Debug, Clone)]
 pub struct DynamicsState<S> {
     /// Inertia matrix M(q), row-major `n * n`.
@@ -270,7 +273,7 @@ pub struct DynamicsState<S> {
     pub bias: Vec<S>,
 }
 
-/// Longest chain that can be simulated; code of this size serves any number of joints.
+/// Longest chain that can be simulated. Code of this size serves any number of joints.
 pub const MOST_JOINTS: usize = 32;
 
 /// Call `$method::<N>($arguments)` for the smallest compiled size that holds `$n` joints.
@@ -323,7 +326,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Forces on the joints along a motion, `M(q) a + c(q, v) + g(q)`, in `force`.
+    /// Forces on the joints along a motion, `M(q) a + c(q, v) + g(q)`, written to `force`.
     #[inline(never)]
     pub fn forces_along(
         &self,
@@ -343,7 +346,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Accelerations of the joints under forces `tau` [Nm or N], in `acceleration`.
+    /// Accelerations of the joints under the forces `tau` [Nm or N], written to `acceleration`.
     pub fn accelerate(
         &self,
         q: &[S],
@@ -364,7 +367,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Scratch for an evaluation.
+    /// Scratch memory for an evaluation.
     pub fn scratch(&self) -> DynamicsScratch<S> {
         let n = sized!(self.len(), self.padded_size());
         DynamicsScratch {
@@ -384,7 +387,8 @@ impl<S: Scalar> Dynamics<S> {
         N
     }
 
-    /// Inertia matrix at angles `q`, and what [`Dynamics::add_rates`] needs of them.
+    /// Compute the inertia matrix at angles `q`, with everything that [`Dynamics::add_rates`]
+    /// needs.
     pub fn place(&self, q: &[S], scratch: &mut DynamicsScratch<S>) {
         if let Some(along) = &mut scratch.along {
             return along.place(q);
@@ -392,7 +396,7 @@ impl<S: Scalar> Dynamics<S> {
         sized!(self.len(), self.place_sized(q, scratch));
     }
 
-    /// Bias forces at rates `v` and the angles last placed.
+    /// Compute the bias forces at rates `v` and the angles set last.
     pub fn add_rates(&self, v: &[S], scratch: &mut DynamicsScratch<S>) {
         if let Some(along) = &mut scratch.along {
             return along.bias(v, &mut scratch.bias);
@@ -400,7 +404,7 @@ impl<S: Scalar> Dynamics<S> {
         sized!(self.len(), self.add_rates_sized(v, scratch));
     }
 
-    /// Factors of the inertia matrix, in its place.
+    /// Factorize the inertia matrix in place.
     pub fn factorize(&self, scratch: &mut DynamicsScratch<S>) {
         if scratch.along.is_some() {
             return;
@@ -408,7 +412,7 @@ impl<S: Scalar> Dynamics<S> {
         sized!(self.len(), self.factorize_sized(scratch));
     }
 
-    /// Forces to accelerations, with the factors of the inertia matrix.
+    /// Replace forces by accelerations, with the factorized inertia matrix.
     pub fn solve(&self, scratch: &mut DynamicsScratch<S>) {
         if let Some(along) = &mut scratch.along {
             return along.accelerate(&mut scratch.bias);
@@ -447,7 +451,7 @@ impl<S: Scalar> Dynamics<S> {
             return;
         };
         let mut velocity = Screw::zero();
-        // Gravity is an acceleration of the base.
+        // Gravity enters as an acceleration of the base.
         let mut acceleration = Screw {
             angular: Vec3::zero(),
             linear: Vec3(self.gravity.map(|g| -g)),
@@ -501,7 +505,7 @@ impl<S: Scalar> Dynamics<S> {
     #[inline(always)]
     fn compose<const N: usize>(&self, sized: &mut Sized<'_, S, N>) {
         let mut tip = Moments::zero();
-        // The wrench on everything outwards for a unit acceleration of each joint.
+        // The wrench on all outer links for a unit acceleration of each joint.
         for (i, segment) in self.segments.iter().enumerate().take(N).rev() {
             if segment.body.is_some() {
                 tip.add(&sized.moments[i]);

@@ -2,8 +2,10 @@
 
 use axisight_scalar::Scalar;
 
-/// `L D L^T` of the first `n` rows of a symmetric positive definite `a`, in its upper triangle;
-/// about `n^3 / 6` multiplications. The diagonal becomes `1 / d`, entries right of it hold `d l`.
+/// `L D L^T` of the first `n` rows of a symmetric positive definite `a`, in its upper triangle.
+///
+/// The diagonal becomes `1 / d`, and the entries right of it hold `d l`. It takes about `n^3 / 6`
+/// multiplications.
 #[inline(always)]
 pub(super) fn factorize<S: Scalar, const N: usize>(a: &mut [[S; N]; N], n: usize) {
     for j in 0..n {
@@ -22,8 +24,10 @@ pub(super) fn factorize<S: Scalar, const N: usize>(a: &mut [[S; N]; N], n: usize
     }
 }
 
-/// Solve with the matrix that [`factorize`] left. Works on a copy of `b`, which stays in
-/// registers: in memory, overlapping vectors would wait for one another (a third of the time).
+/// Solve with the matrix that [`factorize`] returned.
+///
+/// The solve works on a copy of `b`, which stays in registers. In memory, overlapping vectors would
+/// wait for each other, which costs a third of the time.
 #[inline(always)]
 pub(super) fn solve_factorized<S: Scalar, const N: usize>(
     a: &[[S; N]; N],
@@ -53,7 +57,7 @@ mod tests {
 
     #[test]
     fn solves_a_known_system() {
-        // A = G G^T with a fixed G, x chosen, b = A x.
+        // A = G G^T with a fixed G, a chosen x, and b = A x.
         let g = [
             1.0, 0.3, -0.2, 0.7, 0.0, 2.0, 0.4, -1.1, 0.5, 0.0, 1.5, 0.3, -0.6, 0.2, 0.0, 1.2,
         ];

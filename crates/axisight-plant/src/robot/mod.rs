@@ -1,4 +1,4 @@
-//! The arm: its description, its chain and the rigid-body algorithms on it.
+//! The arm: its description, its chain and its rigid-body algorithms.
 
 mod along;
 mod chain;

@@ -23,13 +23,13 @@ pub enum Parameter {
     ViscousFriction(usize),
 }
 
-/// A name that is no parameter of the robot.
+/// Error: the robot has no parameter of this name.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("parameter `{name}`: expected one of {expected}")]
 pub struct ParameterError {
-    /// What was asked for.
+    /// The requested name.
     pub name: String,
-    /// Names this robot has.
+    /// The names of the robot's parameters.
     pub expected: String,
 }
 
@@ -55,7 +55,7 @@ impl Parameter {
     /// The parameter called `name`.
     ///
     /// # Errors
-    /// [`ParameterError`] with the names the robot has.
+    /// [`ParameterError`] with the names of the robot's parameters, if `name` is not one of them.
     pub fn parse(name: &str, robot: &RobotDescription) -> Result<Self, ParameterError> {
         let all = Self::all(robot);
         all.iter()
@@ -103,7 +103,7 @@ impl Parameter {
         format!("{joint}.{quantity}")
     }
 
-    /// Value in a description; zero where the robot has no such part.
+    /// Value in a description; zero if the robot has no such part.
     pub fn nominal(self, robot: &RobotDescription) -> f64 {
         let Some(joint) = robot.joints.get(self.joint()) else {
             return 0.0;
@@ -122,7 +122,7 @@ impl Parameter {
         }
     }
 
-    /// Replace the value in a description; nothing happens where the robot has no such part.
+    /// Set the value in a description; does nothing if the robot has no such part.
     pub fn set(self, robot: &mut RobotDescription, value: f64) {
         let Some(joint) = robot.joints.get_mut(self.joint()) else {
             return;
@@ -144,7 +144,7 @@ impl Parameter {
         }
     }
 
-    /// Set a mass property of the chain; other parameters are left to the plant.
+    /// Set a mass property of the chain. The plant sets all other parameters.
     pub fn apply_to_chain<S: Scalar>(self, value: S, chain: &mut Chain<S>) {
         let Some(body) = chain
             .joints

@@ -14,20 +14,20 @@ pub struct RigidBody {
     gravity: [f64; 3],
 }
 
-/// A vector has the wrong length or a non-finite entry.
+/// Error: a vector has the wrong length or a non-finite entry.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{field}: expected {expected}, got {got}")]
 pub struct ShapeError {
     /// Name of the argument.
     pub field: &'static str,
-    /// What it should be.
+    /// Expected value.
     pub expected: String,
-    /// What came.
+    /// Actual value.
     pub got: String,
 }
 
 impl RigidBody {
-    /// The chain of a robot, motors and springs left out.
+    /// The chain of a robot, without motors and springs.
     pub fn new(robot: &RobotDescription) -> Self {
         let chain = Chain::new(robot);
         Self {
@@ -127,12 +127,12 @@ impl RigidBody {
         Ok(a)
     }
 
-    /// Scratch for states one after another.
+    /// Scratch memory, for evaluating one state after another.
     pub fn scratch(&self) -> DynamicsScratch<f64> {
         self.dynamics.scratch()
     }
 
-    /// [`RigidBody::inverse_dynamics`] in `tau`, one number a joint.
+    /// [`RigidBody::inverse_dynamics`], written to `tau`, with one entry per joint.
     ///
     /// # Errors
     /// [`ShapeError`].
@@ -149,7 +149,7 @@ impl RigidBody {
         Ok(())
     }
 
-    /// [`RigidBody::forward_dynamics`] in `a`, one number a joint.
+    /// [`RigidBody::forward_dynamics`], written to `a`, with one entry per joint.
     ///
     /// # Errors
     /// [`ShapeError`].

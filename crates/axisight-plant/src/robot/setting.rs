@@ -14,9 +14,9 @@ pub enum Place {
 }
 
 impl std::fmt::Display for Place {
-    /// As people count: axes from 1.
+    /// Axes are counted from 1, as users do.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // An axis 0 of people is the largest number here.
+        // A user's axis 0 is the largest integer here; `wrapping_add` gives 0 again.
         match self {
             Self::Arm => write!(f, "no axis"),
             Self::Axis(i) => write!(f, "axis {}", i.wrapping_add(1)),
@@ -32,14 +32,14 @@ impl std::fmt::Display for Place {
 pub struct EffectSetting<S> {
     /// Name in the effect table.
     pub name: String,
-    /// Where it acts.
+    /// Place where it acts.
     pub place: Place,
-    /// Parameters in the order of the table.
+    /// Parameters, in the order of the effect table.
     pub parameters: Vec<S>,
 }
 
 impl<S> EffectSetting<S> {
-    /// Name and place as people write them: `payload`, `backlash@2`, `axis_coupling@5,6`.
+    /// Name and place in user notation: `payload`, `backlash@2`, `axis_coupling@5,6`.
     pub fn label(&self) -> String {
         let name = &self.name;
         match self.place {

@@ -134,7 +134,7 @@ impl<S: Scalar> Mat3<S> {
         let column = |j: usize| Vec3(from_fn(|k| other[k][j]));
         Self(from_fn(|i| from_fn(|j| Vec3(self.0[i]).dot(&column(j)))))
     }
-    /// Matrix times a constant vector; zero entries cost nothing.
+    /// Matrix times a constant vector. Zero entries cost nothing.
     #[inline(always)]
     pub fn apply_constant(&self, v: &[f64; 3]) -> Vec3<S> {
         let mut out = Vec3::zero();
@@ -180,8 +180,8 @@ pub fn rotate_inertia<S: Scalar>(r: &Mat3<S>, inertia: &[S; 6]) -> [S; 6] {
     ]
 }
 
-/// Move the reference point of a second moment by `-d` (bodies appear shifted
-/// by `d`); `first` and `mass` are the moments about the old point.
+/// Move the reference point of a second moment by `-d`, so that bodies appear shifted by `d`.
+/// `first` and `mass` are the moments about the old point.
 #[inline(always)]
 pub fn shift_inertia<S: Scalar>(second: &mut [S; 6], d: &Vec3<S>, first: &Vec3<S>, mass: S) {
     // With h = first + m d / 2 the second moment grows by 2 (d.h) 1 - (d h^T + h d^T).

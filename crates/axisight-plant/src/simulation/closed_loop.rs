@@ -10,17 +10,19 @@ use crate::robot::Controller;
 use axisight_scalar::Scalar;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What drives a run; arrays are row-major `(n_samples, n_axes)`, one per lane.
+/// Input of a run. Arrays are row-major `(n_samples, n_axes)`, one per lane.
 #[derive(Debug, Clone, Copy)]
 pub enum Drive<'a> {
     /// Motor-side velocity references through the controller [rad/s].
     Reference(&'a [&'a [f64]]),
-    /// Commanded torques, no controller [Nm].
+    /// Commanded torques without a controller [Nm].
     Torque(&'a [&'a [f64]]),
-    /// A logged run: its commanded torques [Nm], plus what the controller's feedback adds
-    /// to keep the simulation on the logged positions [rad]. In a linear loop the added
-    /// torque is what a run driven by references would be off by; in a nonlinear one the
-    /// simulation also stays in phase with the log (lost motion, stiction).
+    /// A logged run: its commanded torques [Nm], plus a feedback torque that keeps the simulation
+    /// on the logged positions [rad].
+    ///
+    /// In a linear loop, the added torque is the error that a simulation driven by references would
+    /// have. In a nonlinear loop, the simulation also stays in phase with the log (lost motion,
+    /// stiction).
     Tracking {
         /// Logged torque commands.
         torque: &'a [&'a [f64]],
@@ -38,27 +40,27 @@ pub struct Run<'a> {
     pub sample_time: f64,
     /// Driven joint angles at the start [rad]: one set for all lanes, or one per lane.
     pub start: &'a [&'a [f64]],
-    /// References or torques; a lane shorter than the longest is held at zero.
+    /// References or torques. A lane that is shorter than the longest is continued with zeros.
     pub drive: Drive<'a>,
     /// Position measurement noise per lane, shaped like the drive; empty for none [rad].
     pub noise: &'a [&'a [f64]],
-    /// Integrator; for the linear plant only the sub-steps of Runge-Kutta count.
+    /// Integrator. For a linear plant, only the sub-steps of Runge-Kutta methods are used.
     pub method: Method,
     /// Step of the position sensor [rad]; zero for none.
     pub resolution: f64,
-    /// Whether samples say what torque effects add on the motors; zero where not asked for.
+    /// Whether samples include the torque that effects add on the motors; otherwise it is zero.
     pub disturbances: bool,
-    /// Set by another thread to end the run early.
+    /// Flag by which another thread ends the run early.
     pub cancel: Option<&'a AtomicBool>,
 }
 
 impl Run<'_> {
-    /// Whether delays are those of targets, not of torques.
+    /// Whether delays act on position references instead of torques.
     pub fn has_late_targets(&self) -> bool {
         matches!(self.drive, Drive::Reference(_)) && self.controller.has_targets()
     }
 
-    /// Driven joint angles at the start, each lane at its own.
+    /// Driven joint angles at the start, with the values of each lane.
     pub fn start_angles<S: Scalar>(&self, n_axes: usize) -> Vec<S> {
         (0..n_axes)
             .map(|axis| lane_value(self.start, 0, axis, n_axes))
@@ -66,7 +68,7 @@ impl Run<'_> {
     }
 }
 
-/// One sample as the log sees it, and the truth behind it.
+/// One sample as the log records it, with the true disturbances and state.
 #[derive(Debug)]
 pub struct Sample<'a, S> {
     /// Sample number.
@@ -75,8 +77,8 @@ pub struct Sample<'a, S> {
     pub command: &'a [S],
     /// Measured motor position [rad].
     pub measured: &'a [S],
-    /// Torque added on the motor by ripple, friction and other effects [Nm], where the run
-    /// asks for it.
+    /// Torque that ripple, friction and other effects add on the motor [Nm]; zero unless the run
+    /// requests it.
     pub torque_disturbance: &'a [S],
     /// Error of the position measurement, noise included [rad].
     pub position_disturbance: &'a [S],
@@ -89,44 +91,44 @@ pub struct Sample<'a, S> {
 pub enum Status {
     /// All samples were simulated.
     Completed,
-    /// A state became infinite or NaN at this sample: the loop is unstable.
+    /// A state became infinite or NaN at this sample, so the loop is unstable.
     Diverged(usize),
-    /// The error bound could not be met at this sample: the plant is too stiff for an
-    /// explicit method or a parameter is far off.
+    /// The error bound could not be met at this sample. The plant is too stiff for an explicit
+    /// method, or a parameter is far off.
     StepSizeCollapsed(usize),
     /// The run was cancelled before this sample.
     Cancelled(usize),
 }
 
-/// Misuse of the simulation.
+/// Error in the use of the simulation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimulationError {
     /// The arm does not settle.
     #[error(transparent)]
     Equilibrium(#[from] EquilibriumError),
-    /// An array has the wrong size.
+    /// An array has the wrong size or a non-finite entry.
     #[error("{field}: expected {expected}, got {got}")]
     Shape {
-        /// Argument.
+        /// Name of the argument.
         field: &'static str,
-        /// What it should be.
+        /// Expected value.
         expected: String,
-        /// What came.
+        /// Actual value.
         got: String,
     },
-    /// An implicit method without the Jacobian of [`Stepper::with_jacobian`].
+    /// The method is implicit, but the stepper was made without [`Stepper::with_jacobian`].
     #[error(
         "method: expected an explicit one for several runs in lock-step or for derivatives, got {0:?}"
     )]
     NoJacobian(Method),
-    /// A course that does not fit the run.
+    /// The course does not fit the run.
     #[error(
         "course: expected at least {expected} samples and a method of fixed steps, got {got} samples and {method:?}"
     )]
     Course {
-        /// Samples of the run.
+        /// Number of samples of the run.
         expected: usize,
-        /// Samples of the course.
+        /// Number of samples of the course.
         got: usize,
         /// Integrator.
         method: Method,
@@ -134,18 +136,18 @@ pub enum SimulationError {
     /// A reference-driven run needs a controller.
     #[error("controller: expected one for a run driven by velocity references, got kind `none`")]
     NoController,
-    /// An effect is misused.
+    /// An effect is used incorrectly.
     #[error(transparent)]
     Effect(#[from] EffectError),
-    /// The robot that the controller knows cannot be built.
+    /// The robot model of the controller cannot be built.
     #[error(transparent)]
     Known(#[from] PlantError),
 }
 
-/// Simulate until the longest lane ends; `observe` sees every sample.
+/// Simulate until the longest lane ends; `observe` receives every sample.
 ///
 /// # Errors
-/// [`SimulationError`] for misuse; trouble during the run is a [`Status`].
+/// [`SimulationError`] if the input is invalid. A failure during the run is a [`Status`].
 #[inline(never)]
 pub fn simulate<S: Scalar>(
     plant: &Plant<S>,
@@ -218,7 +220,7 @@ pub fn simulate<S: Scalar>(
     Ok(Status::Completed)
 }
 
-/// Refuse a rigid gear that another axis turns along: it would be a constraint.
+/// Refuse a rigid gear that another axis turns, because it would be a constraint.
 fn check_turned<S: Scalar>(plant: &Plant<S>) -> Result<(), EffectError> {
     let turns = |lead: &&Lead<S>| (0..S::LANES).any(|lane| lead.by.lane(lane) != 0.0);
     for (i, axis) in plant.axes.iter().enumerate() {
@@ -234,7 +236,7 @@ fn check_turned<S: Scalar>(plant: &Plant<S>) -> Result<(), EffectError> {
     Ok(())
 }
 
-/// Whether no state is infinite or NaN: zero times the sum of all would be NaN.
+/// Whether all states are finite: zero times their sum is NaN if any is not.
 fn all_finite<S: Scalar>(x: &[S]) -> bool {
     let zero = S::Real::zero();
     let sum = x.iter().fold(zero, |sum, v| v.real().fma(zero, sum));
@@ -248,26 +250,27 @@ pub struct Signals<S> {
     /// Commanded torques [Nm].
     pub command: Vec<S>,
     reference: Vec<S>,
-    /// What of the commands keeps the simulation on a log [Nm]; zero without one.
+    /// Part of the commands that keeps the simulation on a log [Nm]; zero without a log.
     pub added: Vec<S>,
     /// Torque that effects add on the motors [Nm].
     pub torque_disturbance: Vec<S>,
     /// Error of the measured positions, noise included [rad].
     pub position_disturbance: Vec<S>,
-    /// Error of encoders on the joints where the run begins [rad].
+    /// Error of joint encoders at the start of the run [rad].
     joint_error_at_start: Vec<S>,
-    /// By how much the controller's clock is fast against that of the references; none where they are one.
+    /// Relative error of the controller's clock, positive if fast compared with the references;
+    /// `None` if both use one clock.
     clock_drift: Option<S>,
-    /// Share of each command that the drive reports, and what it reports [Nm]; empty where all
-    /// report what they are told.
+    /// Share of each command that the drive reports, and the reported torque [Nm]; empty if every
+    /// drive reports its full command.
     reported_share: Vec<S>,
     reported: Vec<S>,
-    /// Of axes whose motors are read late; empty where none is.
+    /// Delayed readings by axis; empty if no motor is read with a delay.
     late: Vec<Option<LateReading<S>>>,
 }
 
 impl<S: Scalar> Signals<S> {
-    /// All zero.
+    /// Signals of zero.
     pub fn new(n_axes: usize) -> Self {
         let zeros = vec![S::zero(); n_axes];
         Self {
@@ -285,8 +288,8 @@ impl<S: Scalar> Signals<S> {
         }
     }
 
-    /// All zero, with what the drives of a plant report, and sensors that read motors late, at rest at
-    /// `angle`.
+    /// Signals of zero for a plant at rest at the motor angles `angle`, prepared for reported
+    /// torques and delayed readings.
     fn of(plant: &Plant<S>, angle: &[S], sample_time: f64) -> Self {
         let n_axes = plant.axes.len();
         let mut signals = Self::new(n_axes);
@@ -339,7 +342,7 @@ impl<S: Scalar> Signals<S> {
         }
     }
 
-    /// Error of encoders on the joint of an axis, motor side, counted from where the run begins [rad].
+    /// Error of the joint encoders of an axis, motor side [rad], relative to the start of the run.
     fn joint_error(&mut self, axis: &Axis<S>, i: usize, k: usize, angle: S) -> S {
         let errors = axis
             .kernels
@@ -354,12 +357,12 @@ impl<S: Scalar> Signals<S> {
         (error - self.joint_error_at_start[i]) * (1.0 / axis.ratio)
     }
 
-    /// Reading of an axis at motor angle `angle`, to the nearest step of the sensor.
+    /// Read an axis at motor angle `angle`, rounded to the nearest step of the sensor.
     #[inline(always)]
     pub fn read(&mut self, axis: usize, angle: S, mut error: S, resolution: S) {
         if (0..S::LANES).any(|lane| resolution.lane(lane) > 0.0) {
             let exact = angle + error;
-            // Rounding is flat between its jumps: derivatives pass as if it were not there.
+            // Rounding is constant between its jumps, so derivatives pass unchanged.
             error += S::from_lanes(|lane| {
                 let (x, step) = (exact.lane(lane), resolution.lane(lane));
                 if step > 0.0 {
@@ -373,7 +376,7 @@ impl<S: Scalar> Signals<S> {
         self.measured[axis] = angle + error;
     }
 
-    /// The command of sample `k`, from what was measured.
+    /// Compute the command of sample `k` from the measured positions.
     #[inline(always)]
     pub fn command(&mut self, run: &Run<'_>, k: usize, controller: &mut ControlLoop<S>) {
         let n = self.command.len();
@@ -417,12 +420,12 @@ impl<S: Scalar> Signals<S> {
         }
     }
 
-    /// Torque that effects add on the motors in the present state.
+    /// Compute the torque that effects add on the motors in the present state.
     fn disturb(&mut self, plant: &Plant<S>, x: &[S]) {
         plant.motor_disturbances(x, &self.command, &mut self.torque_disturbance);
     }
 
-    /// What an observer sees at sample `index` in state `x`.
+    /// The sample `index` in state `x`, for an observer.
     pub fn sample<'a>(&'a self, index: usize, x: &'a [S]) -> Sample<'a, S> {
         Sample {
             index,
@@ -439,7 +442,7 @@ impl<S: Scalar> Signals<S> {
     }
 }
 
-/// Entry `(k, axis)` of each lane's array; zero beyond its end or without arrays.
+/// Entry `(k, axis)` of each lane's array; zero beyond its end, or if there are no arrays.
 #[inline(always)]
 pub fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: usize) -> S {
     S::from_lanes(|lane| {
@@ -451,8 +454,8 @@ pub fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: u
     })
 }
 
-/// Entry of each lane's array at sample `(1 + drift) k`, between samples in a line; the first or
-/// last one beyond them.
+/// Entry of each lane's array at sample `(1 + drift) k`, linearly interpolated. Outside of the
+/// array it is the first or last entry.
 fn value_at<S: Scalar>(arrays: &[&[f64]], k: usize, drift: S, axis: usize, n_axes: usize) -> S {
     let late = drift * k as f64;
     let whole = S::from_lanes(|lane| late.lane(lane).floor());
@@ -462,7 +465,8 @@ fn value_at<S: Scalar>(arrays: &[&[f64]], k: usize, drift: S, axis: usize, n_axe
                 return 0.0;
             };
             let last = (array.len() / n_axes).saturating_sub(1);
-            // Drifts are bounded, and runs have far fewer samples than numbers have digits.
+            // The cast is safe: drifts are bounded, and runs have far fewer samples than a float
+            // has digits.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             let sample = (k as f64 + whole.lane(lane) + further).max(0.0) as usize;
             let entry = array.get(sample.min(last) * n_axes + axis);
@@ -473,10 +477,10 @@ fn value_at<S: Scalar>(arrays: &[&[f64]], k: usize, drift: S, axis: usize, n_axe
     (late - whole).fma(at(1.0) - before, before)
 }
 
-/// Number of samples of a run of `n_axes` axes in at most `lanes` lanes.
+/// Check a run of `n_axes` axes in at most `lanes` lanes; returns its number of samples.
 ///
 /// # Errors
-/// [`SimulationError`] naming the field that is wrong.
+/// [`SimulationError`] that names the invalid field.
 pub fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, SimulationError> {
     let shape = |field, expected: String, got: String| SimulationError::Shape {
         field,
@@ -550,7 +554,7 @@ pub fn check(run: &Run<'_>, n_axes: usize, lanes: usize) -> Result<usize, Simula
                 let expected = format!("samples of {n_axes} axes");
                 return Err(shape(name, expected, format!("{} numbers", array.len())));
             }
-            // The whole array first: without an early exit the scan is vector code.
+            // Scan the whole array first: without an early exit the loop becomes vector code.
             let all_finite = array.iter().fold(true, |all, v| all & v.is_finite());
             let bad = || array.iter().position(|v| !v.is_finite());
             if let Some(i) = (!all_finite).then(bad).flatten() {

@@ -8,28 +8,29 @@ use crate::robot::{Controller, Known};
 use axisight_scalar::Scalar;
 use std::sync::Arc;
 
-/// What effects change of the controller of one axis.
+/// Changes that effects make to the controller of one axis.
 #[derive(Debug, Clone, Copy)]
 pub struct OwnLaw<S> {
-    /// Factors of the proportional and the integral gain; of a PD controller of the position and the
-    /// velocity gain. The third is that of the position gain of a cascade.
+    /// Factors of three gains: proportional, integral, and the position gain of a cascade. For a PD
+    /// controller, the first two are those of the position and velocity gains.
     gains: [S; 3],
-    /// Torque for the rate of the reference, and for the reference; `None` without.
+    /// Feed-forward gains for the rate of the reference and for the reference; `None` without
+    /// feed-forward.
     forward: Option<[S; 2]>,
-    /// Share of a new speed in the filtered one; `None` without a filter.
+    /// Weight of a new speed in the filtered speed; `None` without a filter.
     filter: Option<S>,
-    /// By how many samples commands take effect late; `None` at once.
+    /// Delay of the commands [samples]; `None` without delay.
     late: Option<S>,
 }
 
 impl<S: Scalar> OwnLaw<S> {
-    /// What the effects on each axis of a plant make of a controller.
+    /// The changes that the effects of a plant make to its controller, by axis.
     pub fn of(plant: &Plant<S>, sample_time: f64) -> Vec<Self> {
         let of = |axis: &Axis<S>| Self::of_axis(&axis.kernels, sample_time);
         plant.axes.iter().map(of).collect()
     }
 
-    /// The same of one axis.
+    /// The changes that `kernels` make to the controller of one axis.
     pub fn of_axis(kernels: &[Arc<dyn Kernel<S>>], sample_time: f64) -> Self {
         let mut own = Self {
             gains: [S::one(); 3],
@@ -48,7 +49,7 @@ impl<S: Scalar> OwnLaw<S> {
             }
             own.forward = kernel.feedforward().or(own.forward);
             if let Some(lag) = kernel.speed_filter() {
-                // Backward difference: without a lag the speed is what it was.
+                // Backward difference: without a lag, the filter returns the speed unchanged.
                 own.filter = Some((lag + sample_time).recip() * sample_time);
             }
         }
@@ -56,7 +57,7 @@ impl<S: Scalar> OwnLaw<S> {
     }
 }
 
-/// A controller with its memory; commands are motor torques [Nm].
+/// A controller with its memory. Its commands are motor torques [Nm].
 pub struct ControlLoop<S: Scalar> {
     kind: Controller,
     sample_time: f64,
@@ -72,12 +73,14 @@ pub struct ControlLoop<S: Scalar> {
     known: Option<KnownRobot<S>>,
     last_speed: Vec<S>,
     last_target_speed: Vec<S>,
-    /// Of axes whose targets take effect late.
+    /// Delayed position references by axis; `None` for axes without delay.
     late: Vec<Option<LateTarget<S>>>,
 }
 
-/// What is late where a controller has targets of positions: its loop is closed at the motor, and what is
-/// commanded from afar are the targets. Empty for others, whose torques are late.
+/// The delayed references of each axis.
+///
+/// A controller of positions closes its loop at the motor, so a delay acts on its references. The
+/// list is empty for all other controllers, whose torques are delayed.
 fn late_targets<S: Scalar>(
     kind: &Controller,
     own: &[OwnLaw<S>],
@@ -91,11 +94,12 @@ fn late_targets<S: Scalar>(
 }
 
 impl<S: Scalar> ControlLoop<S> {
-    /// A controller settled at motor angles `angle` with static torques `feed_forward`; `own` says
-    /// by axis what effects change of it, none where it is empty.
+    /// A controller settled at the motor angles `angle` with the static torques `feed_forward`.
+    ///
+    /// `own` holds the changes that effects make to it, by axis; it may be empty.
     ///
     /// # Errors
-    /// [`PlantError`] of a robot that the controller knows and that cannot be built.
+    /// [`PlantError`] if the robot model of the controller cannot be built.
     pub fn new(
         kind: &Controller,
         sample_time: f64,
@@ -106,7 +110,7 @@ impl<S: Scalar> ControlLoop<S> {
         let mut known = KnownRobot::of(kind, angle.len())?;
         let mut feed_forward = feed_forward.to_vec();
         if let Some(known) = &mut known {
-            // Where it settled it holds the arm, whatever it knows.
+            // In the settled pose it holds the arm, whatever its robot model says.
             let still = vec![S::zero(); angle.len()];
             let held = known.torque(angle, &still, &still);
             let held = feed_forward.iter_mut().zip(held);
@@ -131,7 +135,8 @@ impl<S: Scalar> ControlLoop<S> {
         })
     }
 
-    /// Commands for measured motor angles `measured` and velocity references `reference`.
+    /// Compute the commands for measured motor angles `measured` and velocity references
+    /// `reference`.
     pub fn command(&mut self, measured: &[S], reference: &[S], out: &mut [S]) {
         let rate = 1.0 / self.sample_time;
         if self.previous_reference.is_empty() {
@@ -169,14 +174,15 @@ impl<S: Scalar> ControlLoop<S> {
         }
     }
 
-    /// Set `added` to the feedback that keeps `measured` on the logged positions
-    /// `logged`, both counted from their first sample. Effects change nothing of it: it is none of
-    /// the machine.
+    /// Set `added` to the feedback that keeps `measured` on the logged positions `logged`. Both
+    /// count from their first sample.
+    ///
+    /// This feedback is not part of the machine, so effects do not change it.
     pub fn follow(&mut self, measured: &[S], logged: &[S], added: &mut [S]) {
         let rate = 1.0 / self.sample_time;
         let first_sample = self.first_lag.is_empty();
         for i in 0..measured.len() {
-            // The lag behind the log takes the place of the measured angle of an ordinary loop.
+            // The lag behind the log replaces the measured angle of an ordinary loop.
             let lag = measured[i] - logged[i];
             if first_sample {
                 self.first_lag.push(lag);
@@ -192,7 +198,7 @@ impl<S: Scalar> ControlLoop<S> {
         }
     }
 
-    /// Acceleration of the target of axis `i` where a law takes it; none at the first sample.
+    /// Acceleration of the reference of axis `i`, if the law uses it; zero at the first sample.
     #[inline(always)]
     fn rate_of_target(&mut self, i: usize, speed: S) -> S {
         let Controller::PdPosition {
@@ -211,7 +217,8 @@ impl<S: Scalar> ControlLoop<S> {
         change * (1.0 / self.sample_time)
     }
 
-    /// Torque for the reference of axis `i` and its rate; none at the first sample.
+    /// Feed-forward torque for the reference of axis `i` and its rate. The rate is zero at the
+    /// first sample.
     #[inline(always)]
     fn forward(&mut self, i: usize, reference: S) -> S {
         let Some([for_rate, for_itself]) = self.own.get(i).and_then(|own| own.forward) else {
@@ -222,8 +229,10 @@ impl<S: Scalar> ControlLoop<S> {
         for_rate * ((reference - before) * (1.0 / self.sample_time)) + for_itself * reference
     }
 
-    /// Angle and speed of axis `i` that a command is for: those measured, or, of a law that holds between
-    /// samples, those halfway to the next one. A speed measured is that of half a sample ago.
+    /// Angle and speed of axis `i` for which a command is computed.
+    ///
+    /// A sampled law uses the measured values. A law that also acts between samples uses the values
+    /// halfway to the next sample, because a measured speed is half a sample old.
     #[inline(always)]
     fn halfway(&mut self, i: usize, angle: S, speed: S) -> (S, S) {
         let Controller::PdPosition {
@@ -238,7 +247,8 @@ impl<S: Scalar> ControlLoop<S> {
         (angle + ahead, speed + change)
     }
 
-    /// By how much a speed is off its reference, which is zero where a controller has targets only.
+    /// Error of a speed. The speed reference is zero if the controller uses position references
+    /// only.
     #[inline(always)]
     fn speed_error(&self, reference: S, speed: S) -> S {
         match self.kind {
@@ -253,7 +263,7 @@ impl<S: Scalar> ControlLoop<S> {
         }
     }
 
-    /// Speed of axis `i` as the controller takes it, which may lag behind the measured one.
+    /// Filtered speed of axis `i`, as the controller uses it.
     #[inline(always)]
     fn filter(&mut self, i: usize, speed: S) -> S {
         let Some(share) = self.own.get(i).and_then(|own| own.filter) else {
@@ -264,7 +274,7 @@ impl<S: Scalar> ControlLoop<S> {
         self.filtered[i]
     }
 
-    /// Torque for errors of speed and angle, all gains times `gains` as in [`OwnLaw`].
+    /// Torque for errors of speed and angle, with the gain factors `gains` as in [`OwnLaw`].
     #[inline(always)]
     fn feedback(&mut self, i: usize, speed_error: S, angle_error: S, gains: [S; 3]) -> S {
         let [own_kp, own_ki, own_kv] = gains;

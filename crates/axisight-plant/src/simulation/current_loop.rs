@@ -1,14 +1,14 @@
-//! What a current loop makes of a command that is held: its moments in closed form.
+//! Response of a current loop to a held command, as moments in closed form.
 //!
-//! The excess `e` of the delivered torque over the command decays by itself, of first order
-//! `T e' + e = 0` or of second order `T^2 e'' + 2 D T e' + e = 0`. Both are integrated over a piece
-//! in which the command is constant; integrals of `e` and `t e` follow from the equation itself.
+//! The excess `e` of the delivered torque over the command decays by `T e' + e = 0` (first order)
+//! or `T^2 e'' + 2 D T e' + e = 0` (second order). Both are integrated over a piece with a constant
+//! command. The integrals of `e` and `t e` follow from the equation itself.
 
 use axisight_scalar::Scalar;
 
-/// Keeps a time constant of zero from dividing by zero; far below any time that matters.
+/// Avoids a division by a time constant of zero; far below any relevant time.
 const SHORTEST_S: f64 = 1e-18;
-/// Time constants after which nothing is left of an excess, and its phase does not matter.
+/// Number of time constants after which the excess has vanished and its phase does not matter.
 const OVER: f64 = 700.0;
 
 /// Zeroth and first moment of a torque over a piece, in samples.
@@ -26,7 +26,7 @@ pub(super) struct Delivered<S> {
 }
 
 impl<S: Scalar> Delivered<S> {
-    /// Settled at a torque.
+    /// A loop settled at a torque.
     pub fn settled(torque: S) -> Self {
         Self {
             torque,
@@ -35,15 +35,16 @@ impl<S: Scalar> Delivered<S> {
     }
 }
 
-/// Current loop of one axis; times are in samples.
+/// Current loop of one axis, with times in samples.
 pub(super) struct CurrentLoop<S> {
     time_constant: S,
-    /// Of a loop of second order.
+    /// Damping ratio of a loop of second order.
     damping: Option<S>,
 }
 
 impl<S: Scalar> CurrentLoop<S> {
-    /// Of this time constant [s], of second order if there is a `damping` ratio below one.
+    /// A loop with this time constant [s]. A `damping` ratio, which must be below one, makes it one
+    /// of second order.
     pub fn new(time_constant_s: S, damping: Option<S>, sample_time: f64) -> Self {
         Self {
             time_constant: (time_constant_s + SHORTEST_S) * (1.0 / sample_time),
@@ -51,7 +52,8 @@ impl<S: Scalar> CurrentLoop<S> {
         }
     }
 
-    /// Moments of the excess over `command` for `width`, begun at `start`; the state moves on.
+    /// Moments of the excess over `command` during `width`, which begins at `start`; advances
+    /// `state`.
     pub fn excess(&self, command: S, start: S, width: S, state: &mut Delivered<S>) -> Moments<S> {
         let excess = state.torque - command;
         let (left, own) = match self.damping {

@@ -4,7 +4,7 @@ use super::method::{Interval, Stepper};
 use super::torque_path::Line;
 use axisight_scalar::Scalar;
 
-/// Stages, the last one for the error estimate only.
+/// Number of stages; the last one serves the error estimate only.
 pub(super) const STAGES: usize = 7;
 
 const NODE: [f64; STAGES] = [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
@@ -49,7 +49,7 @@ const ERROR: [f64; STAGES] = [
     -1.0 / 40.0,
 ];
 
-/// States smaller than this [rad, rad/s] are held to an absolute error.
+/// States below this size [rad, rad/s] have an absolute error bound.
 pub(super) const SMALLEST_STATE: f64 = 1e-3;
 
 /// One step of length `h` [s]; returns the largest local error relative to the state.
@@ -71,7 +71,7 @@ pub(super) fn step<S: Scalar>(
     }
     stepper.reusable.clear();
     stepper.reusable.extend_from_slice(&stepper.applied);
-    // The last probe is the fifth-order solution; its own memory now takes the error.
+    // The last probe is the fifth-order solution. Its memory then holds the error.
     x.copy_from_slice(&stepper.probe);
     stepper.probe.fill(S::zero());
     for (weight, k) in ERROR.iter().zip(&stepper.stages) {
@@ -80,8 +80,8 @@ pub(super) fn step<S: Scalar>(
     largest_relative(&stepper.probe, x)
 }
 
-/// Make the last stage of the step before the first of this one, if only motor torques have
-/// changed since.
+/// Reuse the last stage of the previous step as the first of this one, if only motor torques have
+/// changed. Returns false if that is not possible.
 #[inline(always)]
 fn reuse_last_stage<S: Scalar>(
     interval: &Interval<'_, S>,
@@ -113,7 +113,7 @@ fn add<S: Scalar>(sum: &mut [S], weight: f64, k: &[S]) {
     }
 }
 
-/// Largest error in units of its state, over all lanes; NaN if any is.
+/// Largest error relative to its state, over all lanes; NaN if any error is NaN.
 pub(super) fn largest_relative<S: Scalar>(error: &[S], x: &[S]) -> f64 {
     let floor = S::constant(SMALLEST_STATE);
     let (mut worst, mut nan) = (S::zero(), S::zero());
@@ -121,7 +121,7 @@ pub(super) fn largest_relative<S: Scalar>(error: &[S], x: &[S]) -> f64 {
         let size = x.abs();
         let relative = e.abs() / (size - floor).if_positive(size, floor);
         worst = (relative - worst).if_positive(relative, worst);
-        // A comparison lets NaN pass; a sum does not. Infinity times zero is NaN as well.
+        // A comparison drops NaN, but a sum keeps it. Infinity times zero is NaN as well.
         nan = relative.fma(S::zero(), nan);
     }
     (0..S::LANES).fold(0.0, |largest: f64, lane| {
@@ -135,18 +135,19 @@ pub(super) fn largest_relative<S: Scalar>(error: &[S], x: &[S]) -> f64 {
 
 /// Boundary of the stability region on the negative real axis.
 const STABLE: f64 = 3.25;
-/// A sample of so many explicit sub-steps costs more than an implicit one.
+/// From this number of sub-steps on, an explicit sample costs more than an implicit one.
 const DEAR: usize = 8;
-/// Samples that must point to stiffness, those that do not deducted.
+/// Score at which the plant counts as stiff: stiff samples minus other samples.
 const PATIENCE: u32 = 15;
-/// Share of the stable step that counts as held down by stability: the number of sub-steps is
-/// a power of two and may be twice what is needed; accuracy alone keeps steps far below.
+/// Share of the stable step from which on stability counts as the limit. The number of sub-steps is
+/// a power of two and may be twice the required number. If only accuracy limits them, steps are
+/// much shorter.
 const NEAR: f64 = 0.25;
 
-/// After an accepted sample with sub-steps `h`: is the step held down by stability?
+/// Update the stiffness score after an accepted sample with sub-steps `h`.
 ///
-/// The last two stages stand at the same time; their slopes over their distance estimate the
-/// dominating eigenvalue (Hairer, Wanner 1996, section IV.2).
+/// The last two stages are at the same time. The ratio of their slope difference to their distance
+/// estimates the dominant eigenvalue (Hairer, Wanner 1996, section IV.2).
 pub(super) fn watch_stiffness<S: Scalar>(stepper: &mut Stepper<S>, h: f64) {
     if stepper.substeps < DEAR {
         stepper.stiff_score = stepper.stiff_score.saturating_sub(1);

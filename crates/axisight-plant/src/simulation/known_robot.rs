@@ -1,15 +1,15 @@
-//! The robot as a controller knows it: it holds it against gravity, or moves it by its inverse dynamics.
+//! The robot model of a controller, for gravity compensation or computed torque.
 
 use crate::plant::{Plant, PlantError};
 use crate::robot::{Controller, DynamicsScratch, Known};
 use axisight_scalar::Scalar;
 
-/// A rigid robot that no fit changes.
+/// A rigid robot that fits do not change.
 pub struct KnownRobot<S: Scalar> {
     model: Plant<S>,
-    /// Whether commands are accelerations for it.
+    /// Whether the controller's commands are accelerations.
     moves: bool,
-    /// Joint angles, rates and accelerations; elastic joints at rest.
+    /// Joint angles, rates and accelerations. Elastic joints stay at rest.
     joints: [Vec<S>; 3],
     scratch: DynamicsScratch<S>,
     force: Vec<S>,
@@ -17,10 +17,10 @@ pub struct KnownRobot<S: Scalar> {
 }
 
 impl<S: Scalar> KnownRobot<S> {
-    /// The robot that a controller of so many axes knows; `None` where it knows none.
+    /// The robot model of a controller of `n_axes` axes; `None` if the controller has no model.
     ///
     /// # Errors
-    /// [`PlantError`] where it cannot be built.
+    /// [`PlantError`] if the robot cannot be built.
     pub fn of(kind: &Controller, n_axes: usize) -> Result<Option<Self>, PlantError> {
         let Controller::PdPosition {
             known: Some(known), ..
@@ -41,8 +41,9 @@ impl<S: Scalar> KnownRobot<S> {
         }))
     }
 
-    /// Make motor torques of what feedback asks for at measured angles and speeds: accelerations, or torques
-    /// that come on top of those of gravity.
+    /// Convert the output of the feedback to motor torques, at measured angles and speeds.
+    ///
+    /// The output is accelerations, or torques to which gravity is added.
     pub fn command(&mut self, angle: &[S], speed: &[S], out: &mut [S]) {
         if self.moves {
             let wanted = out.to_vec();
@@ -54,7 +55,8 @@ impl<S: Scalar> KnownRobot<S> {
         }
     }
 
-    /// Make motor torques of accelerations for a robot without weight, at rest.
+    /// Convert accelerations to motor torques for a robot at rest, without its weight. Torques stay
+    /// unchanged.
     pub fn weigh(&mut self, angle: &[S], out: &mut [S]) {
         if !self.moves {
             return;

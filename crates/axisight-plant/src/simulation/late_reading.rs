@@ -1,19 +1,20 @@
-//! A motor angle that is read late, between samples by angle and speed at both ends.
+//! Delayed readings of a motor angle, interpolated by angle and speed at both ends of a sample.
 
 use axisight_scalar::Scalar;
 
-/// What was read of one motor, and is not out yet.
+/// Delayed readings of one motor.
 pub struct LateReading<S> {
-    /// Share of a sample by which the reading is older than the second entry of the history.
+    /// Age of the reading relative to the second entry of the history [samples].
     fraction: S,
-    /// Angles and turns of a sample at the speed of the time [rad], oldest first.
+    /// Pairs of angle [rad] and speed times sample time [rad], oldest first.
     history: Vec<[S; 2]>,
 }
 
 impl<S: Scalar> LateReading<S> {
-    /// A reading `samples` late of a motor that stood still at `rest`; lanes share its whole part.
+    /// A reading with a delay of `samples`, of a motor at rest at `rest` before the run. All lanes
+    /// share the whole part of the delay.
     pub fn new(samples: S, rest: S) -> Self {
-        // Bounds on the delay keep the count small and non-negative.
+        // Bounds on the delay keep the count small and not negative.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let whole = samples.lane(0).max(0.0) as usize;
         Self {
@@ -22,9 +23,10 @@ impl<S: Scalar> LateReading<S> {
         }
     }
 
-    /// The reading at a sample in which the motor is at `angle` and would turn by `turn` in one more.
+    /// The reading at a sample in which the motor has `angle`, and the speed times sample time
+    /// `turn`.
     ///
-    /// Hermite's cubic: off by a 384th of the fourth difference of angles at most.
+    /// Hermite's cubic has an error of at most 1/384 of the fourth difference of the angles.
     pub fn read(&mut self, angle: S, turn: S) -> S {
         self.history.rotate_left(1);
         if let Some(newest) = self.history.last_mut() {

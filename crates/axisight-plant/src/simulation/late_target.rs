@@ -1,19 +1,20 @@
-//! Targets that take effect late, in a line between samples.
+//! Delayed references, linearly interpolated between samples.
 
 use axisight_scalar::Scalar;
 
-/// The targets of one axis that are still on their way.
+/// Delayed references of one axis.
 pub struct LateTarget<S> {
-    /// Share of a sample by which the target is older than the second entry of the history.
+    /// Age of the reference relative to the second entry of the history [samples].
     fraction: S,
-    /// Angle [rad] and speed [rad/s], oldest first.
+    /// Pairs of angle [rad] and speed [rad/s], oldest first.
     history: Vec<[S; 2]>,
 }
 
 impl<S: Scalar> LateTarget<S> {
-    /// Targets `samples` late, at rest at `angle` before the run; lanes share the whole part.
+    /// References with a delay of `samples`, at rest at `angle` before the run. All lanes share the
+    /// whole part of the delay.
     pub fn new(samples: S, angle: S) -> Self {
-        // Bounds on the delay keep the count small and non-negative.
+        // Bounds on the delay keep the count small and not negative.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let whole = samples.lane(0).max(0.0) as usize;
         Self {
@@ -22,9 +23,10 @@ impl<S: Scalar> LateTarget<S> {
         }
     }
 
-    /// The target in force at a sample in which `newest` is given.
+    /// The effective reference at the sample in which `newest` is given.
     ///
-    /// Targets are held from sample to sample: what is in force over a sample is, in the mean, the line.
+    /// References are held from sample to sample, so the mean reference over a sample is the linear
+    /// interpolation.
     pub fn read(&mut self, newest: [S; 2]) -> [S; 2] {
         self.history.rotate_left(1);
         if let Some(last) = self.history.last_mut() {

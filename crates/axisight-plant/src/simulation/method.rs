@@ -1,4 +1,4 @@
-//! Choice of integrator, and what all of them share.
+//! Choice of the integrator, and the state that all integrators share.
 
 use super::implicit::Implicit;
 use super::torque_path::{Line, SampleTorque};
@@ -8,25 +8,24 @@ use crate::robot::{Along, Course, DynamicsScratch};
 use axisight_scalar::Scalar;
 use std::sync::Arc;
 
-/// How the plant is integrated inside a sample.
+/// The integrator of the plant inside a sample.
 ///
-/// Every method ends its last step on the sample instant, where the controller acts and
-/// the command jumps: outputs are exact at the samples and no step crosses a jump.
+/// Every method ends its last step at the sample time, when the controller acts and the command
+/// jumps. Outputs are exact at the samples, and no step crosses a jump.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
-    /// Classical Runge-Kutta of order 4 with a fixed number of sub-steps per sample and no
-    /// error control: the reference.
+    /// Classical Runge-Kutta of order 4 with fixed sub-steps and no error control: the reference.
     RungeKutta4 {
         /// Sub-steps per sample.
         substeps: usize,
     },
-    /// Nyström's method of order 4 for second-order equations, with a fixed number of
-    /// sub-steps per sample and no error control: the fastest where steps are short anyway.
+    /// Nyström's method of order 4 for second-order equations, with fixed sub-steps and no error
+    /// control. It is the fastest if steps are short anyway.
     Nystrom4 {
         /// Sub-steps per sample.
         substeps: usize,
     },
-    /// Dormand-Prince 5(4), explicit; the sub-step is halved until the local error is below
+    /// Dormand-Prince 5(4), explicit. The sub-step is halved until the local error is below
     /// `tolerance` times the size of each state.
     DormandPrince {
         /// Relative local error per sub-step.
@@ -56,12 +55,12 @@ impl Default for Method {
 }
 
 impl Method {
-    /// Whether the steps are the same whatever the plant does.
+    /// Whether the steps are independent of the plant.
     pub fn has_fixed_steps(self) -> bool {
         matches!(self, Self::RungeKutta4 { .. } | Self::Nystrom4 { .. })
     }
 
-    /// Whether the method may need the exact Jacobian of [`Stepper::with_jacobian`].
+    /// Whether the method may need the Jacobian of [`Stepper::with_jacobian`].
     pub fn may_be_implicit(self) -> bool {
         matches!(
             self,
@@ -70,59 +69,59 @@ impl Method {
     }
 }
 
-/// What a run cost.
+/// Effort of a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Effort {
-    /// Right-hand sides evaluated, those inside Jacobians not counted.
+    /// Number of evaluations of the right-hand side, without those inside Jacobians.
     pub evaluations: u64,
-    /// Steps taken.
+    /// Number of steps.
     pub steps: u64,
-    /// Steps thrown away because their error was too large or the iteration did not converge.
+    /// Number of steps rejected because of their error or a failed iteration.
     pub rejections: u64,
-    /// Jacobians evaluated.
+    /// Number of Jacobians.
     pub jacobians: u64,
-    /// Matrices factorized.
+    /// Number of matrix factorizations.
     pub factorizations: u64,
-    /// Samples integrated by an implicit method.
+    /// Number of samples that an implicit method integrated.
     pub implicit_samples: u64,
 }
 
-/// Integrator state of one run: scratch and effort counters.
+/// Integrator of one run: scratch memory, state and effort counters.
 pub struct Stepper<S: Scalar> {
     pub(super) plant_scratch: DynamicsScratch<S>,
     pub(super) stages: Vec<Vec<S>>,
     pub(super) probe: Vec<S>,
     pub(super) applied: Vec<S>,
-    /// Torques of the last Dormand-Prince stage, which is the first of the next step but for
-    /// the torques; empty when there is none to reuse.
+    /// Torques of the last Dormand-Prince stage. Apart from the torques, that stage is the first of
+    /// the next step. Empty if there is no stage to reuse.
     pub(super) reusable: Vec<S>,
     pub(super) start: Vec<S>,
-    /// First of the sample's equal parts that the step in hand covers, and their number.
+    /// The current step covers this part of the sample: index, and number of equal parts.
     part: (usize, usize),
     pub(super) implicit: Option<Box<dyn Implicit<S>>>,
     /// Sub-steps per sample of the error-controlled explicit method.
     pub(super) substeps: usize,
-    /// Samples whose explicit step was held down by stability, less those that were not.
+    /// Stiffness score: samples whose step was limited by stability, minus other samples.
     pub(super) stiff_score: u32,
-    /// What the run cost so far.
+    /// Effort of the run so far.
     pub effort: Effort,
 }
 
-/// Sub-step budget of one sample before a run is given up.
+/// Largest number of sub-steps in one sample.
 const MAX_SUBSTEPS: usize = 4096;
 
-/// A course of another arm.
+/// Error: the course belongs to an arm with another number of joints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("course: expected one of {expected} joints, got {got}")]
 pub struct CourseOfAnother {
-    /// Joints of the plant.
+    /// Number of joints of the plant.
     pub expected: usize,
-    /// Joints of the course.
+    /// Number of joints of the course.
     pub got: usize,
 }
 
 impl<S: Scalar> Stepper<S> {
-    /// Scratch for `plant`; explicit methods only.
+    /// A stepper for `plant`, for explicit methods only.
     pub fn new(plant: &Plant<S>) -> Self {
         let n = plant.n_states();
         let zeros = vec![S::zero(); n];
@@ -141,11 +140,13 @@ impl<S: Scalar> Stepper<S> {
         }
     }
 
-    /// Scratch for `plant` with its arm linearised along `course`, see
-    /// [`Plant::follows_courses`]; methods of fixed steps only.
+    /// A stepper for `plant` with its arm linearised along `course`, for methods with fixed steps
+    /// only.
+    ///
+    /// The plant must satisfy [`Plant::follows_courses`].
     ///
     /// # Errors
-    /// [`CourseOfAnother`] where `course` is of an arm of other joints.
+    /// [`CourseOfAnother`] if `course` has another number of joints.
     pub fn along(plant: &Plant<S>, course: &Arc<Course<S::Real>>) -> Result<Self, CourseOfAnother> {
         let (expected, got) = (plant.chain.len(), course.joints());
         if got != expected {
@@ -156,19 +157,19 @@ impl<S: Scalar> Stepper<S> {
         Ok(stepper)
     }
 
-    /// Number of samples of the course, where there is one.
+    /// Number of samples of the course, if there is one.
     pub(super) fn course_samples(&self) -> Option<usize> {
         self.plant_scratch.along.as_ref().map(Along::samples)
     }
 
-    /// Go to a sample.
+    /// Move to a sample.
     pub(super) fn enter(&mut self, sample: usize) {
         if let Some(along) = &mut self.plant_scratch.along {
             along.enter(sample);
         }
     }
 
-    /// Fraction `at` of the step in hand.
+    /// Move to the fraction `at` of the current step.
     #[inline(always)]
     fn go_to(&mut self, at: f64) {
         if let Some(along) = &mut self.plant_scratch.along {
@@ -177,19 +178,19 @@ impl<S: Scalar> Stepper<S> {
         }
     }
 
-    /// Forget the last run.
+    /// Reset the state of the last run.
     pub(super) fn begin(&mut self) {
         self.reusable.clear();
         self.substeps = 1;
         self.stiff_score = 0;
     }
 
-    /// Whether implicit methods can be used.
+    /// Whether implicit methods are available.
     pub fn has_jacobian(&self) -> bool {
         self.implicit.is_some()
     }
 
-    /// Right-hand side at fraction `at` of the sub-step with torque `lines`.
+    /// Evaluate the right-hand side at the fraction `at` of the sub-step with the torques `lines`.
     #[inline]
     pub(super) fn stage(
         &mut self,
@@ -213,7 +214,7 @@ impl<S: Scalar> Stepper<S> {
         );
     }
 
-    /// [`Stepper::stage`] at the angles of the last one.
+    /// [`Stepper::stage`] at the angles of the previous stage.
     #[inline]
     pub(super) fn stage_in_place(
         &mut self,
@@ -250,7 +251,7 @@ pub(super) struct Interval<'a, S> {
 }
 
 impl<S: Scalar> Interval<'_, S> {
-    /// Advance `x` over the sample; false if the error bound cannot be met.
+    /// Advance `x` over the sample. Returns false if the error bound cannot be met.
     pub(super) fn advance(
         &self,
         method: Method,
@@ -281,7 +282,7 @@ impl<S: Scalar> Interval<'_, S> {
                     dormand_prince::watch_stiffness(stepper, h);
                     return true;
                 }
-                // Explicit steps cannot meet the bound: stiff beyond doubt.
+                // Explicit steps cannot meet the bound, so the plant is stiff.
                 torque.rewind();
                 dormand_prince::declare_stiff(stepper);
                 self.advance_implicitly(Method::RadauIia { tolerance }, x, stepper, torque)
@@ -323,8 +324,8 @@ impl<S: Scalar> Interval<'_, S> {
             .is_some_and(|solver| solver.advance(method, self, x, torque, effort))
     }
 
-    /// Dormand-Prince with equal sub-steps, as many as the bound asks for; where it cannot be
-    /// met, `x` is what it was.
+    /// Advance by Dormand-Prince with equal sub-steps, as many as the error bound requires. If the
+    /// bound cannot be met, returns false and leaves `x` unchanged.
     fn advance_explicitly(
         &self,
         tolerance: f64,
@@ -336,7 +337,8 @@ impl<S: Scalar> Interval<'_, S> {
         loop {
             match self.attempt(tolerance, x, stepper, torque) {
                 Some(error) => {
-                    // Order 5: halving the count raises the error about 32 times.
+                    // The method has order 5, so half the number of sub-steps raises the error
+                    // about 32 times.
                     if error < 1.0 / 64.0 && stepper.substeps > 1 {
                         stepper.substeps /= 2;
                     }
@@ -356,7 +358,7 @@ impl<S: Scalar> Interval<'_, S> {
         }
     }
 
-    /// Largest error over the sample in units of the tolerance; `None` above one.
+    /// Largest error over the sample in units of the tolerance; `None` if it is above one.
     fn attempt(
         &self,
         tolerance: f64,

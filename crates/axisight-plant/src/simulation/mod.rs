@@ -1,4 +1,4 @@
-//! Sampled-data simulation: controller at the sample time, plant in between.
+//! Sampled-data simulation: the controller acts at the sample time, the plant moves in between.
 
 mod closed_loop;
 mod controller;

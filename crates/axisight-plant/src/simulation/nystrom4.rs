@@ -1,10 +1,9 @@
 //! Nyström's method of order 4 for second-order equations (Nyström 1925; Hairer, Norsett,
 //! Wanner, *Solving Ordinary Differential Equations I*, section II.14).
 //!
-//! As many stages as the classical Runge-Kutta method, but the two in the middle are at the
-//! same angles, where the inertia matrix and its factors are the same too; and the phase of an
-//! undamped oscillation is 8/3 times as accurate. States of effects are carried along like
-//! rates.
+//! It has as many stages as the classical Runge-Kutta method. The two middle stages have the same
+//! angles, so the inertia matrix and its factors are computed once for both. The phase of an
+//! undamped oscillation is 8/3 times as accurate. States of effects are treated like rates.
 
 use super::method::{Interval, Stepper};
 use super::torque_path::Line;
@@ -43,7 +42,7 @@ pub(super) fn step<S: Scalar>(
     let [k1, k2, k3, k4, ..] = &mut stepper.stages[..] else {
         return;
     };
-    // Kept before the rates change, which the angles need as they were.
+    // Computed before the rates change, because the angles need the old rates.
     for (((k1, k2), k3), k4) in k1[n..]
         .iter_mut()
         .zip(&k2[n..])
@@ -59,7 +58,7 @@ pub(super) fn step<S: Scalar>(
     x.copy_from_slice(&stepper.probe);
 }
 
-/// Angles of `out` from those of `x`: `y + width y' + square k`.
+/// Set the angles of `out` to `y + width y' + square k`, with `y` and `y'` from `x`.
 #[inline(always)]
 fn angles<S: Scalar>(out: &mut [S], x: &[S], n: usize, width: S, square: S, k: &[S]) {
     for i in 0..n {
@@ -67,7 +66,7 @@ fn angles<S: Scalar>(out: &mut [S], x: &[S], n: usize, width: S, square: S, k: &
     }
 }
 
-/// Everything else of `out` from `x`: `y' + width k`.
+/// Set all other states of `out` to `y' + width k`, with `y'` from `x`.
 #[inline(always)]
 fn rates<S: Scalar>(out: &mut [S], x: &[S], n: usize, width: S, k: &[S]) {
     for ((out, x), k) in out[n..].iter_mut().zip(&x[n..]).zip(&k[n..]) {

@@ -1,11 +1,12 @@
-//! From commanded torque to the torque the drive delivers inside a sample.
+//! The path from commanded torque to the torque that the drive delivers.
 //!
-//! Command -> limit -> transport delay -> current-loop lag -> torque constant and offset -> motor.
-//! Delay and lag make the torque vary inside a sample. It is handed to the
-//! integrator as the straight line with the same mean and first moment over
-//! each sub-step: velocity and position at the end of the step, which depend
-//! on those two moments only, are then exact for the motor inertia, whatever
-//! the delay or lag, and the result is smooth in both parameters.
+//! The order is: command, limit, transport delay, current-loop lag, torque constant and offset,
+//! motor.
+//!
+//! Delay and lag make the torque vary inside a sample. Over each sub-step, the integrator receives
+//! the straight line with the same mean and first moment. Velocity and position of the motor
+//! inertia at the end of the step depend only on these two moments, so they are exact for any delay
+//! or lag. The result is smooth in both parameters.
 
 use super::current_loop::{CurrentLoop, Delivered, Moments};
 use crate::effect::Kernel;
@@ -13,7 +14,7 @@ use crate::plant::Axis;
 use axisight_scalar::Scalar;
 use std::sync::Arc;
 
-/// Torque over a sub-step: `mean + slope (s - 1/2)` for `s` from 0 to 1.
+/// Torque over a sub-step, `mean + slope (s - 1/2)` for `s` from 0 to 1.
 #[derive(Debug, Clone, Copy)]
 pub struct Line<S> {
     mean: S,
@@ -27,7 +28,7 @@ impl<S: Scalar> Line<S> {
         self.mean + self.slope * (s - 0.5)
     }
 
-    /// The line of the first lane in plain numbers.
+    /// The line of the first lane, in plain numbers.
     pub fn first_lane(&self) -> Line<f64> {
         Line {
             mean: self.mean.lane(0),
@@ -46,20 +47,20 @@ impl<S: Scalar> Line<S> {
 pub struct TorquePath<S> {
     kernels: Vec<Arc<dyn Kernel<S>>>,
     delay: Option<Delay<S>>,
-    /// Of first and of second order; one of them at most does anything.
+    /// Current loops of first and second order. At most one of them is active.
     loops: [Option<CurrentLoop<S>>; 2],
-    /// Of these, at the start of the sample.
+    /// State of the loops at the start of the sample.
     state: States<S>,
 }
 
-/// What the loops of an axis deliver, one after the other.
+/// Delivered torques of the loops of an axis, in their order.
 type States<S> = [Delivered<S>; 2];
 
 struct Delay<S> {
     /// Fraction of a sample at which the command changes.
     fraction: S,
-    /// The commands the drive still has to apply, oldest first: the one in force at
-    /// the start of the sample, the one it switches to, and those to come.
+    /// Commands that the drive still has to apply, oldest first: the one in force at the start of
+    /// the sample, the one after the switch, and later ones.
     history: Vec<S>,
 }
 
@@ -69,7 +70,7 @@ impl<S: Scalar> TorquePath<S> {
         Self::through(axis.kernels.clone(), rest, sample_time)
     }
 
-    /// The same without its transport delay, which is elsewhere.
+    /// The same path without its transport delay, for controllers with delayed references.
     #[must_use]
     pub fn at_once(mut self) -> Self {
         self.delay = None;
@@ -93,7 +94,7 @@ impl<S: Scalar> TorquePath<S> {
         }
     }
 
-    /// Take the command of a new sample; returns what limits and deadbands make of it.
+    /// Add the command of a new sample. Returns it after limits and deadbands.
     pub fn push(&mut self, command: S) -> S {
         let command = self.kernels.iter().fold(command, |u, k| k.command(u));
         if let Some(delay) = &mut self.delay {
@@ -114,12 +115,12 @@ impl<S: Scalar> TorquePath<S> {
         self.kernels.iter().fold(torque, |t, k| k.drive(t))
     }
 
-    /// What the gain of the drive makes of a torque in units of commands.
+    /// A torque in command units, multiplied by the gain of the drive.
     fn gained(&self, torque: S) -> S {
         self.delivered(torque) - self.delivered(S::zero())
     }
 
-    /// Torque between the fractions `from` and `to` of a sample; `state` of the lag moves on.
+    /// Torque between the fractions `from` and `to` of a sample; advances the lag state `state`.
     fn line(&self, command: S, from: f64, to: f64, state: &mut States<S>) -> Line<S> {
         let width = to - from;
         let mut zeroth = S::zero();
@@ -130,7 +131,7 @@ impl<S: Scalar> TorquePath<S> {
             first += m.first;
         }
         let mean = zeroth * (1.0 / width);
-        // First moment about the middle of the sub-step, for unit width.
+        // First moment about the middle of the sub-step, for a width of one.
         let tilt = first * (1.0 / (width * width)) - mean * 0.5;
         // Drive kernels are affine (gain and offset), so they commute with the moments.
         let (low, high) = (
@@ -151,7 +152,7 @@ impl<S: Scalar> TorquePath<S> {
             Some(delay) => {
                 let (older, newer) = (delay.history[0], delay.history[1]);
                 let switch = delay.fraction;
-                // A switch at the very start stays in, for its derivative.
+                // A switch at the very start stays in, because its derivative is needed.
                 if switch.lane(0) < from {
                     [Some((newer, start, end)), None]
                 } else if switch.lane(0) >= to {
@@ -164,11 +165,11 @@ impl<S: Scalar> TorquePath<S> {
         pair.into_iter().flatten()
     }
 
-    /// Moments over a piece of length `width` that starts `start` into the
-    /// sub-step (both in samples), command constant at `torque`.
+    /// Moments over a piece of length `width` that starts at `start` in the sub-step (both in
+    /// samples), with the constant command `torque`.
     ///
-    /// The second loop takes what the first one ends at: exact where one of them does nothing,
-    /// derivatives included.
+    /// The input of the second loop is the final torque of the first. This is exact if one of the
+    /// loops is inactive, including derivatives.
     fn moments(&self, torque: S, start: S, width: S, states: &mut States<S>) -> Moments<S> {
         let mut held = torque;
         let mut sum = Moments {
@@ -187,26 +188,26 @@ impl<S: Scalar> TorquePath<S> {
     }
 }
 
-/// Torque of all axes over one sample, handed out span by span.
+/// Torque of all axes over one sample, span by span.
 pub struct SampleTorque<'a, S> {
     paths: &'a mut [TorquePath<S>],
     buffers: &'a mut TorqueBuffers<S>,
     varies: bool,
 }
 
-/// Memory of [`SampleTorque`] that outlives the samples.
+/// Memory of [`SampleTorque`] that is kept from sample to sample.
 pub struct TorqueBuffers<S> {
     commands: Vec<S>,
-    /// What of the commands acts on the motors at once.
+    /// Part of the commands that acts on the motors at once.
     added: Vec<S>,
-    /// Lag states at the start of the span in hand and at its end.
+    /// Lag states at the start and at the end of the current span.
     at_start: Vec<States<S>>,
     at_end: Vec<States<S>>,
     lines: Vec<Line<S>>,
 }
 
 impl<S: Scalar> TorqueBuffers<S> {
-    /// For `n_axes` axes.
+    /// Memory for `n_axes` axes.
     pub fn new(n_axes: usize) -> Self {
         let states = vec![[Delivered::settled(S::zero()); 2]; n_axes];
         Self {
@@ -220,12 +221,15 @@ impl<S: Scalar> TorqueBuffers<S> {
 }
 
 impl<'a, S: Scalar> SampleTorque<'a, S> {
-    /// Take the commands of a new sample; `added`: what of each is none of the machine's.
+    /// Take the commands of a new sample; `added` is the part of each command that is not the
+    /// machine's.
     ///
-    /// That acts on the motor at once: what keeps a simulation on a log answers noise alike, whatever delay or lag is
-    /// tried in it. Through a lag it would answer more, and fits would make lags of too much or too little. It is in
-    /// units of commands all the same: in those of the motor a machine of less inertia and a weaker motor, which is
-    /// the same to any command, would need less of it.
+    /// `added` keeps a simulation on a log. It acts on the motor at once, so that it responds to
+    /// noise in the same way for every delay or lag. Through a lag it would respond more strongly,
+    /// and fits would prefer wrong lags.
+    ///
+    /// `added` is in units of commands. In motor units, a machine with less inertia and a weaker
+    /// motor would need less of it, although both machines respond alike to every command.
     pub fn new(
         paths: &'a mut [TorquePath<S>],
         commands: &[S],
@@ -283,12 +287,12 @@ impl<'a, S: Scalar> SampleTorque<'a, S> {
         &self.buffers.lines
     }
 
-    /// Torque lines of part `i` of `n` equal parts of the sample.
+    /// Torque lines of the part `i` of `n` equal parts of the sample.
     pub fn part(&mut self, i: usize, n: usize) -> &[Line<S>] {
         self.span(i as f64 / n as f64, (i + 1) as f64 / n as f64)
     }
 
-    /// The span in hand was integrated: the next one starts at its end.
+    /// Accept the current span. The next span starts at its end.
     pub fn accept(&mut self) {
         if self.varies {
             let TorqueBuffers {
@@ -298,14 +302,14 @@ impl<'a, S: Scalar> SampleTorque<'a, S> {
         }
     }
 
-    /// Go back to the start of the sample.
+    /// Return to the start of the sample.
     pub fn rewind(&mut self) {
         for (state, path) in self.buffers.at_start.iter_mut().zip(&*self.paths) {
             *state = path.state;
         }
     }
 
-    /// The sample is over.
+    /// End the sample and keep the lag states.
     pub fn finish(self) {
         for (path, state) in self.paths.iter_mut().zip(&self.buffers.at_start) {
             path.state = *state;
@@ -314,9 +318,9 @@ impl<'a, S: Scalar> SampleTorque<'a, S> {
 }
 
 impl<S: Scalar> Delay<S> {
-    /// `samples` is the delay in samples; lanes share its whole part.
+    /// A delay of `samples`, settled at the command `rest`. All lanes share its whole part.
     fn new(samples: S, rest: S) -> Self {
-        // Bounds on the delay keep the count small and non-negative.
+        // Bounds on the delay keep the count small and not negative.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let whole = samples.lane(0).max(0.0) as usize;
         Self {

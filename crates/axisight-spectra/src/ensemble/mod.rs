@@ -1,5 +1,5 @@
-//! Ensembles: random streams as functions of (seed, run) and streaming accumulators that
-//! merge, so that memory does not grow with the number of runs.
+//! Ensembles of simulated runs: random streams as functions of (seed, run), and streaming
+//! accumulators that merge. Memory does not grow with the number of runs.
 
 mod moments;
 mod quantiles;
@@ -9,14 +9,14 @@ pub use moments::{Moments, STATISTICS};
 pub use quantiles::{QuantileSketch, SketchError};
 pub use seeds::{Purpose, generator};
 
-/// Accumulators of different shape cannot be merged.
+/// Error: two accumulators have different shapes and cannot be merged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{field}: expected {expected}, got {got}")]
 pub struct MergeError {
-    /// What differs.
+    /// The property that differs.
     pub field: &'static str,
-    /// What this accumulator holds.
+    /// Value of this accumulator.
     pub expected: String,
-    /// What came.
+    /// Value of the other accumulator.
     pub got: String,
 }

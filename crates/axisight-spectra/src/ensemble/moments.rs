@@ -1,14 +1,19 @@
 //! Streaming means and second moments of complex responses.
 //!
-//! Per element: arithmetic mean and covariance of (re, im), mean and variance of the
-//! log magnitude, mean direction, and mean of the inverse matrix's element. One value at
-//! a time by Welford (1962), two accumulators by Chan, Golub, `LeVeque` (1983). Merging is
-//! associative to rounding; whoever needs the same bits merges in one fixed order.
+//! The statistics of an element are:
+//!
+//! * the arithmetic mean and the covariance of (re, im),
+//! * the mean and the variance of the log magnitude,
+//! * the mean direction,
+//! * the mean of the element of the inverse matrix.
+//!
+//! Single values follow Welford (1962), merged accumulators Chan, Golub, `LeVeque` (1983). Merging
+//! is associative up to rounding. For identical bits, merge in a fixed order.
 
 use super::MergeError;
 use nalgebra::Complex;
 
-/// Statistics per element, in the order of [`Moments::values`].
+/// Names of the statistics, in the order of [`Moments::values`].
 pub const STATISTICS: [&str; 11] = [
     "mean_real",
     "mean_imag",
@@ -27,16 +32,16 @@ const N: usize = STATISTICS.len();
 /// Accumulated moments of `size` elements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Moments {
-    /// Responses counted, per element.
+    /// Number of responses of each element.
     pub count: Vec<u64>,
-    /// Inverse responses counted, per element; fewer where a response was singular.
+    /// Number of inverse responses of each element. Singular responses have no inverse.
     pub inverse_count: Vec<u64>,
     /// `(statistic, element)`, row-major.
     pub values: Vec<f64>,
 }
 
 impl Moments {
-    /// Nothing counted yet.
+    /// Empty accumulators for `size` elements.
     pub fn new(size: usize) -> Self {
         Self {
             count: vec![0; size],
@@ -55,7 +60,7 @@ impl Moments {
         &mut self.values[statistic * size + element]
     }
 
-    /// Count one finite response at `element`.
+    /// Add one finite response at `element`.
     pub fn push(&mut self, element: usize, g: Complex<f64>) {
         self.count[element] += 1;
         let n = self.count[element] as f64;
@@ -66,14 +71,14 @@ impl Moments {
         *self.at(2, element) += dx * rx;
         *self.at(3, element) += dy * ry;
         *self.at(4, element) += dx * ry;
-        // A response of exactly zero counts as the smallest normal number, not as -inf.
+        // A response of exactly zero has the log of the smallest normal number, not -inf.
         let magnitude = g.norm().max(f64::MIN_POSITIVE);
         let log = magnitude.ln();
         let dl = log - *self.at(5, element);
         *self.at(5, element) += dl / n;
         let rl = log - *self.at(5, element);
         *self.at(6, element) += dl * rl;
-        // Unit vectors have a mean that does not care where the phase is cut.
+        // The mean of unit vectors does not depend on where the phase wraps.
         let direction = g / magnitude;
         let (du, dv) = (
             direction.re - *self.at(7, element),
@@ -83,7 +88,7 @@ impl Moments {
         *self.at(8, element) += dv / n;
     }
 
-    /// Count one finite element of an inverse response.
+    /// Add one finite element of an inverse response.
     pub fn push_inverse(&mut self, element: usize, h: Complex<f64>) {
         self.inverse_count[element] += 1;
         let n = self.inverse_count[element] as f64;
@@ -92,7 +97,7 @@ impl Moments {
         *self.at(10, element) += dy / n;
     }
 
-    /// Add what `other` has counted.
+    /// Add the values of `other`.
     ///
     /// # Errors
     /// [`MergeError`] if the sizes differ.

@@ -1,25 +1,26 @@
 //! Quantiles of positive numbers from a logarithmic histogram of fixed relative accuracy.
 //!
 //! Bucket `i` holds `(g^(i-1), g^i]` with `g = (1 + a) / (1 - a)`, so its midpoint
-//! `2 g^i / (g + 1)` is within a factor `1 ± a` of everything in it. Masson, Rim, Lee
-//! (2019), `DDSketch`, PVLDB 12(12). Counts are integers: merging is exactly associative
-//! and commutative. Buckets are kept sparse and never collapsed; a magnitude range of
-//! 10^6 at one per cent accuracy fills 691 of them at most.
+//! `2 g^i / (g + 1)` is within a factor `1 ± a` of every value in it: Masson, Rim, Lee (2019),
+//! `DDSketch`, PVLDB 12(12).
+//!
+//! Counts are integers, so merging is exactly associative and commutative. Buckets are sparse and
+//! never collapsed. A magnitude range of 10^6 at 1 % accuracy fills at most 691 buckets.
 
 use super::MergeError;
 
-/// Bucket of exact zeros (and magnitudes below the smallest normal number).
+/// Bucket of exact zeros and of magnitudes below the smallest normal number.
 const ZERO: i32 = i32::MIN;
 
-/// A sketch that cannot be made or read.
+/// Error: a sketch has an invalid field.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{field}: expected {expected}, got {got}")]
 pub struct SketchError {
-    /// Field.
+    /// Name of the field.
     pub field: &'static str,
-    /// What it should be.
+    /// Expected value.
     pub expected: String,
-    /// What came.
+    /// Actual value.
     pub got: String,
 }
 
@@ -27,7 +28,7 @@ pub struct SketchError {
 #[derive(Debug, Clone, PartialEq)]
 pub struct QuantileSketch {
     accuracy: f64,
-    /// Per element: bucket and count, buckets increasing.
+    /// For each element: pairs of bucket and count, in increasing order of buckets.
     buckets: Vec<Vec<(i32, u64)>>,
 }
 
@@ -59,12 +60,12 @@ impl QuantileSketch {
         ((1.0 + self.accuracy) / (1.0 - self.accuracy)).ln()
     }
 
-    /// Count a magnitude, finite and not negative.
+    /// Add one magnitude, which must be finite and not negative.
     pub fn push(&mut self, element: usize, magnitude: f64) {
         let bucket = if magnitude < f64::MIN_POSITIVE {
             ZERO
         } else {
-            // At most 708 / 2e-5, far inside i32.
+            // At most 708 / 2e-5 in size, far below the limit of i32.
             #[allow(clippy::cast_possible_truncation)]
             let index = (magnitude.ln() / self.log_base()).ceil() as i32;
             index
@@ -93,8 +94,10 @@ impl QuantileSketch {
         Ok(())
     }
 
-    /// The `q`-quantile of an element, `0 <= q <= 1`: within the relative accuracy of the
-    /// sorted value at position `floor(q (n - 1))`. NaN if nothing was counted.
+    /// The `q`-quantile of an element, `0 <= q <= 1`, or NaN if the element is empty.
+    ///
+    /// The result has the relative accuracy of the sketch, compared with the sorted value at
+    /// position `floor(q (n - 1))`.
     pub fn quantile(&self, element: usize, q: f64) -> f64 {
         let Some(buckets) = self.buckets.get(element).filter(|b| !b.is_empty()) else {
             return f64::NAN;
@@ -115,7 +118,8 @@ impl QuantileSketch {
         }
     }
 
-    /// As three flat arrays: where each element starts (`size + 1` entries), buckets, counts.
+    /// Three flat arrays: the start of each element (`size + 1` entries), the buckets and the
+    /// counts.
     pub fn to_parts(&self) -> (Vec<u64>, Vec<i32>, Vec<u64>) {
         let (mut starts, mut buckets, mut counts) = (vec![0], Vec::new(), Vec::new());
         for element in &self.buckets {
@@ -126,10 +130,10 @@ impl QuantileSketch {
         (starts, buckets, counts)
     }
 
-    /// From the arrays of [`QuantileSketch::to_parts`].
+    /// A sketch from the arrays of [`QuantileSketch::to_parts`].
     ///
     /// # Errors
-    /// [`SketchError`] if they do not fit together.
+    /// [`SketchError`] if the arrays do not fit together.
     pub fn from_parts(
         accuracy: f64,
         starts: &[u64],

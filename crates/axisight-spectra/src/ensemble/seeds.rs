@@ -3,8 +3,8 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// What random numbers are for; each purpose has a key of its own, so that
-/// switching one source of randomness off leaves the others as they were.
+/// Purpose of random numbers. Each purpose has its own key, so that disabling one source of
+/// randomness does not change the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
     /// Phases of the excitation.
@@ -13,7 +13,7 @@ pub enum Purpose {
     Spread = 2,
 }
 
-/// The generator of one run; runs are streams of one `ChaCha8` key.
+/// The generator of one run. Runs are streams of one `ChaCha8` key.
 pub fn generator(seed: u64, purpose: Purpose, run: u64) -> ChaCha8Rng {
     let mut key = [0; 32];
     key[..8].copy_from_slice(&seed.to_le_bytes());

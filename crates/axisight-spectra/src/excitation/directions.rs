@@ -1,14 +1,15 @@
-//! Which axis moves how in which experiment: `r(t) = T r_0(t)`, one column per experiment.
+//! Directions of the excitation: `r(t) = T r_0(t)`, with one column of `T` per experiment.
 
 use super::ExcitationError;
 
-/// The square matrix called `name` for `n` axes, row-major `(axis, experiment)`.
+/// The direction matrix called `name` for `n` axes, row-major `(axis, experiment)`.
 ///
-/// `identity`: one axis at a time, T1 of Wernholt (2004), (6.6); `t2`: T2 there, three
-/// axes only; `hadamard`: Sylvester's construction, for 1, 2, 4, 8, ... axes.
+/// * `identity`: one axis at a time, T1 of Wernholt (2004), (6.6).
+/// * `t2`: T2 of the same equation, for three axes only.
+/// * `hadamard`: Sylvester's construction, for 1, 2, 4, 8, ... axes.
 ///
 /// # Errors
-/// [`ExcitationError`] for an unknown name or a size it is not defined for.
+/// [`ExcitationError`] for an unknown name, or for a size for which the matrix is not defined.
 pub fn directions(name: &str, n: usize) -> Result<Vec<f64>, ExcitationError> {
     let wrong = |expected: &str| {
         let got = format!("`{name}` for {n} axes");

@@ -1,4 +1,4 @@
-//! Excitation: velocity references whose spectrum is known.
+//! Excitation signals: velocity references with a known spectrum.
 
 pub mod crest;
 mod directions;
@@ -9,20 +9,19 @@ pub use directions::directions;
 pub use multisine::{Grid, Multisine, random_phases};
 pub use square::Square;
 
-/// An excitation that cannot be made.
+/// Error: an excitation has an invalid field.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{field}: expected {expected}, got {got}")]
 pub struct ExcitationError {
-    /// Field.
+    /// Name of the field.
     pub field: &'static str,
-    /// What it should be.
+    /// Expected value.
     pub expected: String,
-    /// What came.
+    /// Actual value.
     pub got: String,
 }
 
 impl ExcitationError {
-    // Callers hand over numbers and fresh strings alike.
     #[allow(clippy::needless_pass_by_value)]
     fn new(field: &'static str, expected: impl Into<String>, got: impl std::fmt::Display) -> Self {
         Self {
@@ -39,11 +38,12 @@ fn whole_samples(
     seconds: f64,
     sample_time: f64,
 ) -> Result<usize, ExcitationError> {
-    /// More than a day at 10 kHz does not fit in memory anyway.
+    /// A longer record, more than a day at 10 kHz, does not fit in memory.
     const MOST: f64 = 1e9;
     let ratio = seconds / sample_time;
     let whole = ratio.round();
-    // Decimal fractions such as 10.0 / 5e-4 come out a few units in the last place off.
+    // Quotients of decimal fractions such as 10.0 / 5e-4 have an error of a few units in the last
+    // place.
     let close = (ratio - whole).abs() <= 1e-9 * whole.abs();
     if !(seconds.is_finite() && (1.0..MOST).contains(&whole) && close) {
         let expected = format!("a positive whole number of samples of {sample_time} s");

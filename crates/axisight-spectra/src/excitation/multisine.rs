@@ -5,16 +5,16 @@ use crate::ensemble::{Purpose, generator};
 use axisight_numerics::Dft;
 use rand::Rng;
 
-/// Which lines of the band are excited.
+/// The excited lines of the band.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Grid {
-    /// All of them.
+    /// All lines.
     All,
-    /// Odd harmonics of the period only, which keeps even nonlinear distortion off the lines.
+    /// Odd harmonics of the period only, which keeps even nonlinear distortion away from the lines.
     Odd,
 }
 
-/// A multisine with flat amplitude spectrum, scaled to its largest sample.
+/// A multisine with a flat amplitude spectrum, scaled to a given peak.
 #[derive(Debug, Clone)]
 pub struct Multisine {
     dft: Dft,
@@ -23,11 +23,11 @@ pub struct Multisine {
 }
 
 impl Multisine {
-    /// Period `period_s`, lines from `band_hz.0` to `band_hz.1` inclusive, largest absolute
-    /// sample `peak` (in the unit of the signal).
+    /// A multisine with period `period_s` and the lines from `band_hz.0` to `band_hz.1`, both
+    /// included. Its largest absolute sample is `peak` (in the unit of the signal).
     ///
     /// # Errors
-    /// [`ExcitationError`] if the period is no whole number of samples, the band holds no
+    /// [`ExcitationError`] if the period is not a whole number of samples, the band contains no
     /// line or reaches the Nyquist frequency, or the peak is not a positive number.
     pub fn new(
         period_s: f64,
@@ -48,7 +48,7 @@ impl Multisine {
             let expected = "a positive number";
             return Err(ExcitationError::new("multisine.peak_rad_s", expected, peak));
         }
-        // A line on the edge of the band belongs to it, whatever the rounding.
+        // A line on the edge of the band belongs to the band, whatever the rounding.
         let near = 1e-9 * high * period_s;
         let inside = |k: &usize| {
             let x = *k as f64;
@@ -80,15 +80,15 @@ impl Multisine {
         &self.dft
     }
 
-    /// Phases of `run` [rad], uniform over the circle.
+    /// Phases of realization `run` [rad], uniform over the circle.
     pub fn phases(&self, seed: u64, run: u64) -> Vec<f64> {
         random_phases(self.lines.len(), seed, run)
     }
 
     /// One period with the given phases, scaled to the peak.
     ///
-    /// The peak is that of the samples; between them the signal may be higher by
-    /// `1 - cos(pi f_max T)` at most to leading order, 0.2 % at 50 samples per period.
+    /// The peak is the largest absolute sample. Between samples the signal may be higher by at most
+    /// `1 - cos(pi f_max T)` to leading order, which is 0.2 % at 50 samples per period.
     pub fn period(&self, phases: &[f64]) -> Vec<f64> {
         let flat = vec![1.0; self.lines.len()];
         let mut x = self.dft.sum_of_sines(&self.lines, &flat, phases);
@@ -101,7 +101,7 @@ impl Multisine {
     }
 }
 
-/// `n` phases [rad], uniform over the circle, of realization `run`.
+/// `n` phases of realization `run` [rad], uniform over the circle.
 pub fn random_phases(n: usize, seed: u64, run: u64) -> Vec<f64> {
     let mut rng = generator(seed, Purpose::Phases, run);
     let turn = std::f64::consts::TAU;

@@ -2,7 +2,7 @@
 
 use super::{ExcitationError, whole_samples};
 
-/// A square wave, high in the first half of its period.
+/// A smoothed square wave, high in the first half of its period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Square {
     /// Amplitude, in the unit of the signal.
@@ -14,12 +14,14 @@ pub struct Square {
 }
 
 impl Square {
-    /// Period `period_s`, amplitude, and `smoothing` samples on either side of the
-    /// triangular moving average `w_k = (l + 1 - |k|) / (l + 1)^2`.
+    /// A square wave of period `period_s` and the given amplitude.
+    ///
+    /// It is smoothed by the triangular moving average `w_k = (l + 1 - |k|) / (l + 1)^2` with
+    /// `l = smoothing` samples on each side.
     ///
     /// # Errors
-    /// [`ExcitationError`] if the period is not an even whole number of samples, the window
-    /// is longer than half a period, or the amplitude is not a number.
+    /// [`ExcitationError`] if the period is not an even whole number of samples, the window is
+    /// longer than half a period, or the amplitude is not a number.
     pub fn new(
         amplitude: f64,
         period_s: f64,

@@ -1,16 +1,16 @@
-//! What is wrong with a line of an estimate.
+//! Quality flags of the lines of an estimate.
 
-/// Why a line is not to be trusted; the numbers are those of the Python enumeration.
+/// The reason why a line is not reliable. The numbers are those of the Python enumeration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(i8)]
 pub enum LineFlag {
-    /// Nothing.
+    /// The line is reliable.
     Good = 0,
-    /// The experiments do not excite all inputs independently: NaN.
+    /// The experiments do not excite all inputs independently. The response is NaN.
     RankDeficient = 1,
-    /// Errors are amplified more than a thousandfold, or the weakest direction of the input
-    /// is lost in its noise.
+    /// Errors are amplified more than a thousandfold, or the weakest direction of the input is
+    /// below its noise.
     IllConditioned = 2,
-    /// An input has no amplitude: NaN.
+    /// An input has no amplitude. The response is NaN.
     NoExcitation = 3,
 }

@@ -1,4 +1,4 @@
-//! What the local methods return and what they refuse.
+//! Result and errors of the local methods.
 
 use super::flag::LineFlag;
 use super::local_least_squares::C;
@@ -7,34 +7,34 @@ use rayon::prelude::*;
 /// Condition number above which a line is flagged.
 const ILL_CONDITIONED: f64 = 1e3;
 
-/// Responses `(line, output, input)` with their variance, and condition and flag by line.
+/// Responses with their variances, and the condition number and flag of each line.
 #[derive(Debug, Clone)]
 pub struct LocalEstimate {
-    /// Frequency responses.
+    /// Frequency responses, `(line, output, input)`.
     pub response: Vec<C>,
-    /// `E|dG|^2`.
+    /// Variance `E|dG|^2` of the response, `(line, output, input)`.
     pub variance: Vec<f64>,
-    /// Condition number of the scaled regressors.
+    /// Condition number of the scaled regressors, by line.
     pub condition: Vec<f64>,
-    /// Flags.
+    /// Flags, by line.
     pub flag: Vec<LineFlag>,
-    /// Complex degrees of freedom of the residuals behind the variance.
+    /// Complex degrees of freedom of the residuals that give the variance.
     pub degrees_of_freedom: usize,
 }
 
-/// Records that the local methods cannot take.
+/// Error: the local methods cannot use these records or settings.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: expected {expected}, got {got}")]
 pub struct LocalModelError {
-    /// Field.
+    /// Name of the field.
     pub field: &'static str,
-    /// What it should be.
+    /// Expected value.
     pub expected: String,
-    /// What came.
+    /// Actual value.
     pub got: String,
 }
 
-/// A [`LocalModelError`] where `right` does not hold.
+/// Returns a [`LocalModelError`] unless `right` holds.
 pub(super) fn expect(
     right: bool,
     field: &'static str,
@@ -52,7 +52,7 @@ pub(super) fn expect(
     })
 }
 
-/// The results of one line, to be filled.
+/// The part of the results that belongs to one line.
 pub(super) struct Line<'a> {
     pub(super) response: &'a mut [C],
     pub(super) variance: &'a mut [f64],
@@ -77,9 +77,10 @@ impl Line<'_> {
 }
 
 impl LocalEstimate {
-    /// Estimate every line with the scratch of its thread; what is not filled in is NaN.
+    /// Estimate every line with the scratch memory of its thread. Results that are not filled in
+    /// stay NaN.
     ///
-    /// A line depends on the records alone, so threads cannot change the result.
+    /// A line depends on the records alone, so the number of threads does not change the result.
     pub(super) fn over_lines<S>(
         n_lines: usize,
         n_elements: usize,

@@ -1,20 +1,21 @@
 //! Least squares over a few DFT lines, for the local methods.
 //!
-//! Modified Gram-Schmidt with the right-hand sides carried along as further columns: as
-//! accurate as Householder's reflections for the solution (Björck, 1967), indifferent to the
-//! scale of a column, and it leaves the orthonormal columns themselves, which leverages and
-//! weights need. Normal equations would square the condition number, and a noise-free
-//! rational model is nearly dependent by nature. All space is made once per thread.
+//! The method is modified Gram-Schmidt, with the right-hand sides as further columns. It is as
+//! accurate for the solution as Householder reflections (Björck, 1967), does not depend on the
+//! scale of a column, and leaves the orthonormal columns, which leverages and weights need.
+//!
+//! Normal equations would square the condition number, and a noise-free rational model is nearly
+//! dependent by nature. All memory is allocated once per thread.
 
 use nalgebra::Complex;
 
 pub(super) type C = Complex<f64>;
 
-/// A column counts as dependent when less than this of its norm is left by the others:
-/// rounding of records and DFT leaves some 1e-15 to 1e-13.
+/// A column counts as dependent if less than this share of its norm is left after
+/// orthogonalization. Rounding of records and DFT leaves about 1e-15 to 1e-13.
 pub(super) const DEPENDENT: f64 = 1e-11;
 
-/// Complex columns of one length; each holds its real parts, then its imaginary parts, so
+/// Complex columns of one length. Each column stores its real parts, then its imaginary parts, so
 /// that plain loops become vector code.
 #[derive(Debug, Clone)]
 pub(super) struct Columns {
@@ -51,7 +52,8 @@ impl Columns {
         data[rows + row] = value.im;
     }
 
-    /// Remove from a column its part along an earlier, normalised one; that part.
+    /// Subtract from a column its component along an earlier, normalised column; returns the
+    /// coefficient.
     pub(super) fn project(&mut self, column: usize, along: usize) -> C {
         let (before, rest) = self.data.split_at_mut(2 * self.rows * column);
         let unit = &before[2 * self.rows * along..2 * self.rows * (along + 1)];
@@ -68,11 +70,12 @@ impl Columns {
         add(&mut rest[..2 * self.rows], factor, source);
     }
 
-    /// Normalise a column; its norm. A column with at most `least` left becomes zero.
+    /// Normalise a column and return its norm. A column with a norm of at most `least` becomes
+    /// zero.
     pub(super) fn normalise(&mut self, column: usize, least: f64) -> f64 {
         let data = self.get_mut(column);
         let norm = energy(data).sqrt();
-        // Written so that a norm that is not a number is zero as well.
+        // In this form, a norm that is NaN also gives zero.
         let scale = if norm > least { 1.0 / norm } else { 0.0 };
         for v in data {
             *v *= scale;
@@ -121,7 +124,7 @@ pub(super) fn energy(a: &[f64]) -> f64 {
     a.iter().map(|v| v * v).sum()
 }
 
-/// The triangle of a Gram-Schmidt orthogonalisation and its inverse.
+/// The triangular factor of a Gram-Schmidt orthogonalisation, and its inverse.
 #[derive(Debug, Clone)]
 pub(super) struct Triangle {
     size: usize,
@@ -138,8 +141,8 @@ impl Triangle {
         }
     }
 
-    /// Orthonormalise the leading columns in place. `norms` are theirs before anything was
-    /// taken from them. False where they are dependent.
+    /// Orthonormalise the leading columns in place; `norms` are their original norms. Returns false
+    /// if the columns are dependent.
     pub(super) fn orthonormalise(&mut self, columns: &mut Columns, norms: &[f64]) -> bool {
         let n = self.size;
         for c in 0..n {
@@ -170,13 +173,14 @@ impl Triangle {
         }
     }
 
-    /// Row of the inverse triangle.
+    /// A row of the inverse of the triangular factor.
     pub(super) fn inverse_row(&self, row: usize) -> &[C] {
         &self.inverse[row * self.size..(row + 1) * self.size]
     }
 
-    /// Frobenius condition number of the columns scaled to norm one, over its least value:
-    /// 1 for orthogonal columns, at most the usual condition number.
+    /// Frobenius condition number of the columns scaled to norm one, divided by its least value.
+    ///
+    /// The result is 1 for orthogonal columns and at most the usual condition number.
     pub(super) fn condition(&self, norms: &[f64]) -> f64 {
         let n = self.size;
         let (mut forward, mut backward) = (0.0, 0.0);
@@ -190,7 +194,7 @@ impl Triangle {
     }
 }
 
-/// Polynomials orthonormal over points on the frequency axis, up to `order`.
+/// Polynomials up to `order` that are orthonormal over points on the frequency axis.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Polynomials {
     order: usize,
@@ -199,7 +203,8 @@ pub(super) struct Polynomials {
 }
 
 impl Polynomials {
-    /// Over `points`, also evaluated at one more point, `target`, which stands last.
+    /// Compute the polynomials over `points`. They are also evaluated at `target`, which comes
+    /// last.
     pub(super) fn build(&mut self, points: &[f64], target: f64, order: usize) {
         let (n, row) = (points.len(), points.len() + 1);
         (self.order, self.points) = (order, n);
@@ -207,7 +212,8 @@ impl Polynomials {
         for s in 0..=order {
             let (before, rest) = self.values.split_at_mut(s * row);
             let now = &mut rest[..row];
-            // Three-term: x times the last one, made orthogonal (twice, against rounding).
+            // Three-term recurrence: x times the last polynomial, orthogonalized twice against
+            // rounding.
             for (j, v) in now.iter_mut().enumerate() {
                 let x = points.get(j).copied().unwrap_or(target);
                 *v = if s == 0 {
@@ -240,8 +246,8 @@ impl Polynomials {
         self.values[s * (self.points + 1) + self.points]
     }
 
-    /// Take from a signal (real or imaginary parts over the points) what the polynomials
-    /// can follow; that part's value at the target.
+    /// Subtract from a signal (real or imaginary parts over the points) its projection on the
+    /// polynomials; returns the value of the projection at the target.
     pub(super) fn remove(&self, signal: &mut [f64]) -> f64 {
         let mut value = 0.0;
         for s in 0..=self.order {

@@ -1,11 +1,14 @@
-//! Local polynomial method; Pintelon and Schoukens (2012), sections 7.2 and 7.3.
+//! Local polynomial method for periodic excitation; Pintelon and Schoukens (2012), sections 7.2 and
+//! 7.3.
 //!
-//! Arbitrary excitation: response and transient are polynomials over the window. That is the
-//! local rational method with the denominator one, and is computed there. Here: periodic
-//! excitation, several consecutive periods: lines between the harmonics hold transient and noise only; a polynomial through
-//! them gives the transient at the harmonic, where it is subtracted from input and output,
-//! and their residuals give the noise. The response is then `Y U^-1` of that one line (the
-//! pseudo-inverse for more experiments than inputs), without any smoothing of the response.
+//! The records hold several consecutive periods, so the lines between the harmonics contain only
+//! transient and noise. A polynomial through these lines gives the transient at the harmonic, which
+//! is subtracted from input and output. The residuals of the polynomial give the noise. The
+//! response is then `Y U^-1` of that one line, or the pseudo-inverse if there are more experiments
+//! than inputs. The response is not smoothed.
+//!
+//! For arbitrary excitation, response and transient are both polynomials over the window. That is
+//! the local rational method with denominator one, see `local_rational`.
 
 use super::flag::LineFlag;
 use super::local_estimate::{Line, LocalEstimate, LocalModelError, expect};
@@ -14,11 +17,12 @@ use super::local_rational::MAX_ORDER;
 use super::record_spectra::{RecordSpectra, Records};
 
 /// Estimate the response at lines of the period from records of `n_periods` whole periods.
+///
 /// The window holds `half_width` lines between harmonics on each side.
 ///
 /// # Errors
-/// [`LocalModelError`] for a single period, a window longer than the band or too short for
-/// the order, fewer experiments than inputs, and a line out of range.
+/// [`LocalModelError`] if there is a single period, the window is longer than the band or too short
+/// for the order, there are fewer experiments than inputs, or a line is out of range.
 pub fn local_polynomial_periodic(
     records: &Records<'_>,
     n_periods: usize,
@@ -91,14 +95,14 @@ struct Kernel {
     freedom: usize,
 }
 
-/// Space of one thread.
+/// Scratch memory of one thread.
 struct Scratch {
     window: Vec<usize>,
     points: Vec<f64>,
     polynomials: Polynomials,
-    /// Noise over the windows of all experiments, a column per channel, and one to combine.
+    /// Noise over the windows of all experiments: one column per channel, and one for combinations.
     noise: Columns,
-    /// Channels at the harmonic, transient removed, a column each, a row per experiment.
+    /// Channels at the harmonic without transient: one column per channel, one row per experiment.
     harmonic: Columns,
     norms: Vec<f64>,
     triangle: Triangle,
@@ -143,7 +147,7 @@ impl Kernel {
             return out.fail(LineFlag::RankDeficient);
         }
         out.condition(triangle.condition(norms));
-        // The interpolated transient brings noise of its own.
+        // The interpolated transient adds noise of its own.
         let excess: f64 = (0..=self.order)
             .map(|s| polynomials.at_target(s).powi(2))
             .sum();
@@ -157,7 +161,7 @@ impl Kernel {
                     *g += triangle.inverse_row(i)[c] * part;
                 }
             }
-            // Noise of the output less what the noise of the inputs explains.
+            // Subtract from the noise of the output what the noise of the inputs explains.
             noise.get_mut(combined).fill(0.0);
             noise.accumulate(combined, C::new(1.0, 0.0), n + o);
             for (i, g) in response.iter().enumerate() {
@@ -171,7 +175,7 @@ impl Kernel {
         }
     }
 
-    /// The nearest lines that are no harmonics, turn by turn below and above.
+    /// The nearest lines that are not harmonics, alternately below and above `line`.
     fn window(&self, line: usize, scratch: &mut Scratch) {
         let (mut below, mut above) = (line, line);
         scratch.window.clear();
@@ -199,7 +203,7 @@ impl Kernel {
         scratch.polynomials.build(&scratch.points, 0.0, self.order);
     }
 
-    /// Harmonics without transient, and the noise around them.
+    /// Compute the harmonics without transient, and the noise around them.
     fn remove_transients(&self, line: usize, scratch: &mut Scratch) {
         let Scratch {
             window,

@@ -1,20 +1,23 @@
-//! Local rational method: around each line `D(x) Y = N(x) U + C(x)` by linear least squares.
+//! Local rational method: least squares for `D(x) Y = N(x) U + C(x)` around each line.
 //!
 //! `McKelvey` and Guérin (2012), "Non-parametric frequency response estimation using a local
-//! rational model"; Pintelon and Schoukens (2012), chapter 7, for the local polynomial
-//! method, which is the case `D = 1`. `N` (a row per output) and the transient `C` (per
-//! output and experiment) are polynomials over the window, `D` one per output with
-//! `D = 1` at the line itself, where therefore `G = N`.
+//! rational model". The local polynomial method is the case `D = 1`; see Pintelon and Schoukens
+//! (2012), chapter 7.
 //!
-//! The local variable is `x = tan(pi r / N)` for `r` lines from the middle of the window. A
-//! rational function of `z = exp(i w T)` is a rational function of `x` of the same orders
-//! times a common factor, so that sampled systems of low order come out exactly. (For
-//! windows short against the record, as is usual, `x` is `r` but for a scale.)
+//! `N` (one row per output) and the transient `C` (one per output and experiment) are polynomials
+//! over the window. `D` is one polynomial per output, with `D = 1` at the line itself, so that
+//! `G = N` there.
 //!
-//! The error of the equation is `D V` with `V` the noise, white over the window. So
-//! `s^2 = |E|^2 / sum_r |D_r|^2 (1 - h_r)` with leverages `h`, and with the weights `w` that
-//! turn the error into that of `G`, `var G = s^2 sum_r |w_r D_r|^2`: exact for `D = 1`, to
-//! first order in the noise otherwise (noise in the regressors `x^s Y` is second order).
+//! The local variable is `x = tan(pi r / N)` at `r` lines from the middle of the window. A rational
+//! function of `z = exp(i w T)` is a rational function of `x` of the same orders, up to a common
+//! factor. Sampled systems of low order are therefore estimated exactly. For windows that are short
+//! compared with the record, `x` is proportional to `r`.
+//!
+//! The error of the equation is `D V`, where `V` is the noise, white over the window. With the
+//! leverages `h`, the noise variance is `s^2 = |E|^2 / sum_r |D_r|^2 (1 - h_r)`. With the weights
+//! `w` that map the error to the error of `G`, `var G = s^2 sum_r |w_r D_r|^2`. This is exact for
+//! `D = 1`, otherwise to first order in the noise; noise in the regressors `x^s Y` is of second
+//! order.
 
 use super::flag::LineFlag;
 use super::local_estimate::{Line, LocalEstimate, LocalModelError, expect};
@@ -28,20 +31,20 @@ pub struct LocalModel {
     pub order: usize,
     /// Order of the denominators; 0 for the local polynomial method.
     pub denominator_order: usize,
-    /// Lines on each side of the line estimated.
+    /// Number of lines on each side of the estimated line.
     pub half_width: usize,
-    /// First and last line a window may cover; it moves inwards at these ends.
+    /// First and last line that a window may cover. At these ends the window moves inwards.
     pub band: (usize, usize),
 }
 
-/// Largest order of a local polynomial; more is no longer local.
+/// Largest order of a local polynomial.
 pub(super) const MAX_ORDER: usize = 8;
 
 /// Estimate the response at the given lines of the whole record.
 ///
 /// # Errors
-/// [`LocalModelError`] for an order too high, a window longer than the band or too short
-/// for the number of unknowns, and a line out of range.
+/// [`LocalModelError`] if an order is too high, the band is out of range, the window is longer than
+/// the band or too short for the number of unknowns, or a line is out of range.
 pub fn local_rational(
     records: &Records<'_>,
     lines: &[usize],
@@ -74,7 +77,7 @@ pub fn local_rational(
     ))
 }
 
-/// Degrees of freedom of the residuals of one output.
+/// Check the settings; returns the degrees of freedom of the residuals of one output.
 fn check(
     spectra: &RecordSpectra,
     lines: &[usize],
@@ -114,7 +117,8 @@ fn check(
         )
     };
     let equations = m * spectra.n_experiments;
-    // Each transient lives in one experiment: its window alone must do for it.
+    // A transient belongs to one experiment, so the window of this experiment alone must determine
+    // it.
     expect(
         equations > unknowns && m > order + 1,
         "half_width",
@@ -140,13 +144,15 @@ struct Kernel {
     peaks: Vec<f64>,
 }
 
-/// Space of one thread. Columns: numerators (input by input), then for each output those of
-/// the denominator and the output itself, then weights.
+/// Scratch memory of one thread.
+///
+/// The columns are: the numerators (input by input); then for each output its denominator columns
+/// and the output itself; then the weights.
 struct Scratch {
     columns: Columns,
     norms: Vec<f64>,
     triangle: Triangle,
-    /// Parts of the later columns along the numerators, `(column, numerator)`.
+    /// Coefficients of the later columns along the numerators, `(column, numerator)`.
     parts: Vec<C>,
     /// Row of the inverse triangle for each input: `(input, numerator)`.
     rows: Vec<C>,
@@ -154,7 +160,7 @@ struct Scratch {
     output: OutputScratch,
 }
 
-/// Space for one output.
+/// Scratch memory for one output.
 struct OutputScratch {
     triangle: Vec<C>,
     coefficients: Vec<C>,
@@ -230,7 +236,7 @@ impl Kernel {
         })
     }
 
-    /// All columns over the window, transients removed.
+    /// Fill all columns over the window, with transients removed.
     fn fill(&self, first: usize, here: usize, scratch: &mut Scratch) {
         let (spectra, m) = (&self.spectra, self.x.len());
         let (order, d) = (self.model.order, self.model.denominator_order);
@@ -268,12 +274,12 @@ impl Kernel {
         }
     }
 
-    /// First column of an output.
+    /// Index of the first column of an output.
     fn later(&self, output: usize) -> usize {
         self.numerators() + output * (self.model.denominator_order + 1)
     }
 
-    /// What the outputs share: parts along the numerators, weights, leverages.
+    /// Compute what all outputs share: coefficients along the numerators, weights and leverages.
     fn prepare(&self, here: usize, scratch: &mut Scratch) {
         let Scratch {
             columns,
@@ -314,7 +320,7 @@ impl Kernel {
         }
     }
 
-    /// Denominator, response and variance of one output.
+    /// Compute denominator, response and variance of one output.
     fn output(&self, o: usize, here: usize, scratch: &mut Scratch, out: &mut Line<'_>) {
         let (n, m, d) = (
             self.numerators(),
@@ -342,7 +348,7 @@ impl Kernel {
         }
         for (row, squared) in output.denominator.iter_mut().enumerate() {
             let x = self.x[row % m] - self.x[here];
-            // Horner's rule from the highest coefficient down to D = 1 at the line.
+            // Horner's rule, from the highest coefficient down to D = 1 at the line.
             let higher = output.coefficients.iter().rev();
             let value = higher.fold(C::default(), |sum, a| (sum + a) * x);
             *squared = (value + 1.0).norm_sqr();
@@ -365,7 +371,8 @@ impl Kernel {
             output
                 .weights
                 .copy_from_slice(columns.get(self.later(self.spectra.n_outputs) + i));
-            // The denominator's uncertainty: forward substitution with its own triangle.
+            // The uncertainty of the denominator follows by forward substitution with its own
+            // triangle.
             let mut through = [C::default(); MAX_ORDER];
             for s in 0..d {
                 let diagonal = output.triangle[s * d + s].re;
@@ -405,11 +412,12 @@ fn add_leverage(leverage: &mut [f64], column: &[f64]) {
     }
 }
 
-/// Coefficients of the denominator of the output whose columns begin at `start`; leaves its
-/// columns orthonormal and the residual in the last one.
+/// Coefficients of the denominator of the output whose columns begin at `start`.
 ///
-/// A denominator of too high an order shares factors with the numerators; its column is
-/// then dependent and left out, which lowers the order and changes nothing else.
+/// On return the columns are orthonormal, and the last one holds the residual.
+///
+/// A denominator of too high an order shares factors with the numerators. Its column is then
+/// dependent and is left out, which only lowers the order.
 fn solve_denominator(
     columns: &mut Columns,
     norms: &[f64],

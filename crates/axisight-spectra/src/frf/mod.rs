@@ -1,4 +1,4 @@
-//! Frequency responses from periodic records, and from any records by local models.
+//! Frequency responses: from periodic records, and by local models from any records.
 
 mod flag;
 mod local_estimate;

@@ -1,9 +1,13 @@
-//! `G = Y V` with `U V = 1`: the multivariable estimate and its noise, line by line.
+//! Multivariable frequency responses `G = Y V` with `U V = 1`, and their noise, line by line.
 //!
-//! `V = U^-1` is (3.52) of Wernholt (2004), with periods averaged first (3.53), its
-//! pseudo-inverse for more experiments than inputs, and `V = R^+ (U R^+)^-1` the joint
-//! input-output estimate. In all of them the error is to first order
-//! `dG = (dY - G dU) V`: vec(dG) = (V^T kron I) vec(dY - G dU).
+//! There are three choices of `V`:
+//!
+//! * `V = U^-1`: Wernholt (2004), (3.52), after averaging over periods (3.53).
+//! * The pseudo-inverse of `U`, if there are more experiments than inputs.
+//! * `V = R^+ (U R^+)^-1`: the joint input-output estimate with the references `R`.
+//!
+//! For all of them, the error is to first order `dG = (dY - G dU) V`: vec(dG) = (V^T kron I) vec(dY
+//! - G dU).
 
 use super::flag::LineFlag;
 use axisight_numerics::PseudoInverse;
@@ -11,30 +15,30 @@ use nalgebra::Complex;
 
 type C = Complex<f64>;
 
-/// Smallest over largest singular value that counts as full rank: rounding leaves 1e-15 of a
-/// dependent experiment, simulated records some hundred times that.
+/// Smallest ratio of the singular values that counts as full rank. Rounding leaves 1e-15 of a
+/// dependent experiment, and simulated records raise this a hundredfold.
 const SMALLEST_RATIO: f64 = 1e-12;
 
-/// An amplitude below this share of the largest at any line is rounding of the DFT.
+/// Amplitudes below this share of the largest amplitude at any line are rounding of the DFT.
 const SMALLEST_AMPLITUDE: f64 = 1e-12;
 
 /// Condition number above which a line is flagged.
 const LARGE_CONDITION: f64 = 1e3;
 
-/// How the channels of the spectra are laid out.
+/// Layout of the channels of the spectra.
 #[derive(Debug, Clone, Copy)]
 pub struct Layout {
-    /// Experiments.
+    /// Number of experiments.
     pub experiments: usize,
-    /// Periods of each.
+    /// Number of periods of each experiment.
     pub periods: usize,
-    /// Lines.
+    /// Number of lines.
     pub lines: usize,
-    /// Inputs: the first channels.
+    /// Number of inputs, the first channels.
     pub inputs: usize,
-    /// Outputs: the next.
+    /// Number of outputs, the next channels.
     pub outputs: usize,
-    /// References, as many as inputs, last; zero for none.
+    /// Number of references, the last channels: as many as inputs, or zero.
     pub references: usize,
 }
 
@@ -48,25 +52,27 @@ impl Layout {
     }
 }
 
-/// Estimates over `(line, output, input)`; NaN where unknown.
+/// Estimates over `(line, output, input)`, NaN where unknown.
 #[derive(Debug, Clone, Default)]
 pub struct Multivariable {
-    /// G.
+    /// Frequency responses `G`.
     pub response: Vec<C>,
-    /// Variance by the scatter of the periods.
+    /// Variance from the scatter of the periods.
     pub noise_variance: Vec<f64>,
-    /// Complex degrees of freedom of `noise_variance` (Satterthwaite's).
+    /// Complex degrees of freedom of `noise_variance`, by Satterthwaite's formula.
     pub noise_freedom: Vec<f64>,
-    /// Variance by what more experiments than inputs leave of `Y - G U`.
+    /// Variance from the residual `Y - G U` of more experiments than inputs.
     pub residual_variance: Vec<f64>,
-    /// Condition number of U, rows scaled to unit norm, by line.
+    /// Condition number of U with rows scaled to unit norm, by line.
     pub condition: Vec<f64>,
     /// Flags by line.
     pub flag: Vec<i8>,
 }
 
-/// Estimate from `spectra` laid out as `(experiment, period, line, channel)`, at least as many
-/// experiments as inputs; `factor` multiplies the outputs, line by line.
+/// Estimate the responses from `spectra`, laid out as `(experiment, period, line, channel)`.
+///
+/// There must be at least as many experiments as inputs. `factor` multiplies the outputs, line by
+/// line.
 pub fn multivariable(spectra: &[C], layout: Layout, factor: &[C]) -> Multivariable {
     let mut line_of = Line::new(layout);
     let size = layout.lines * layout.outputs * layout.inputs;
@@ -96,12 +102,12 @@ fn largest_amplitudes(spectra: &[C], layout: Layout) -> Vec<f64> {
     largest
 }
 
-/// One line: spectra by period and averaged, and what is made of them.
+/// Spectra and intermediate results of one line.
 struct Line {
     layout: Layout,
-    /// `(experiment, period, channel)`, references left out.
+    /// Spectra of the periods, `(experiment, period, channel)`, without references.
     periods: Vec<C>,
-    /// Averages, `(channel, experiment)`.
+    /// Averages over the periods, `(channel, experiment)`.
     average: Vec<C>,
     solver: PseudoInverse,
     square: PseudoInverse,
@@ -157,7 +163,7 @@ impl Line {
         }
     }
 
-    /// V, G and the condition number.
+    /// Compute V, G and the condition number.
     fn solve(&mut self, largest: &[f64]) -> LineFlag {
         let layout = self.layout;
         let (m, e) = (layout.inputs, layout.experiments);
@@ -189,7 +195,7 @@ impl Line {
         LineFlag::Good
     }
 
-    /// `V = R^+ (U R^+)^-1`; false where the references are not independent.
+    /// Compute `V = R^+ (U R^+)^-1`; returns false if the references are not independent.
     fn through_reference(&mut self) -> bool {
         let layout = self.layout;
         let (m, e) = (layout.inputs, layout.experiments);
@@ -223,7 +229,7 @@ impl Line {
         true
     }
 
-    /// Mean square of the noise of U along one direction, in the scale of `solver`.
+    /// Mean square of the noise of U along one direction, with the scaling of `solver`.
     fn input_noise(&self) -> f64 {
         let layout = self.layout;
         let (m, e, periods, channels) = (
@@ -251,7 +257,8 @@ impl Line {
         total / (periods * (periods - 1) * m) as f64
     }
 
-    /// Variance of `Y - G U` averaged over the periods, by experiment, from their scatter.
+    /// Compute the variance of the mean of `Y - G U` by experiment, from the scatter of its
+    /// periods.
     fn period_scatter(&mut self) {
         let layout = self.layout;
         let (m, e, periods, channels) = (
@@ -284,7 +291,7 @@ impl Line {
         }
     }
 
-    /// Mean square of `Y - G U` over the experiments beyond the inputs.
+    /// Residual variance of `Y - G U`, for more experiments than inputs.
     fn misfit(&self, i: usize) -> f64 {
         let (m, e) = (self.layout.inputs, self.layout.experiments);
         let square = |k: usize| {

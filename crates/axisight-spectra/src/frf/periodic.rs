@@ -5,7 +5,7 @@ use nalgebra::Complex;
 
 type C = Complex<f64>;
 
-/// Which motion the response leads to; all come from the DFT of the position.
+/// The output motion of the response. Each is computed from the DFT of the position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Output {
     /// Position [rad].
@@ -36,10 +36,11 @@ pub struct Spectra {
     pub output: Vec<C>,
 }
 
-/// Responses `(line, output, input)` from one experiment per axis, and how many lines are
-/// singular (the experiments do not excite all inputs there); those are NaN.
+/// Responses `(line, output, input)` from one experiment per axis, and the number of singular
+/// lines.
 ///
-/// `omega` holds the angular frequency of each line [rad/s].
+/// At a singular line the experiments do not excite all inputs, and the response is NaN. `omega`
+/// holds the angular frequency of each line [rad/s].
 pub fn response(experiments: &[Spectra], omega: &[f64], output: Output) -> (Vec<C>, usize) {
     let n = experiments.len();
     let mut solver = SmallSolver::new(n);

@@ -1,4 +1,4 @@
-//! DFT lines of whole records, periodic or not, as the local methods take them.
+//! DFT lines of whole records, periodic or not, for the local methods.
 
 use super::local_least_squares::C;
 use axisight_numerics::{Dft, DftScratch};
@@ -19,7 +19,7 @@ pub struct Records<'a> {
     pub output: &'a [f64],
 }
 
-/// Lines 1 up to below half the sampling frequency of every channel, inputs first.
+/// Lines 1 to the last below half the sampling frequency, for every channel, inputs first.
 #[derive(Debug, Clone)]
 pub(super) struct RecordSpectra {
     pub(super) n_samples: usize,
@@ -49,8 +49,8 @@ impl RecordSpectra {
             Some(o) if o < n_outputs => records.output[(e * n_samples + n) * n_outputs + o],
             Some(_) => 0.0,
         };
-        // Two channels share a transform: each scaled to its peak, or the rounding of a large
-        // one would drown a small one. A silent one stays silent.
+        // Two channels share a transform. Each is scaled to its peak, because the rounding of a
+        // large channel would drown a small one. A channel of zeros stays zero.
         let peak = |e: usize, c: usize| {
             (0..n_samples)
                 .map(|n| sample(e, c, n).abs())
@@ -86,7 +86,7 @@ impl RecordSpectra {
         }
     }
 
-    /// Highest line held.
+    /// Highest line available.
     pub(super) fn last_line(&self) -> usize {
         self.n_lines
     }

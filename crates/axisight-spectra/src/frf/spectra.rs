@@ -13,31 +13,31 @@ type C = Complex<f64>;
 pub struct Channels<'a> {
     /// Samples.
     pub data: &'a [f64],
-    /// Channels.
+    /// Number of channels.
     pub count: usize,
 }
 
-/// How many experiments, periods of each and samples of a period.
+/// Numbers of experiments, of periods, and of samples of a period.
 #[derive(Debug, Clone, Copy)]
 pub struct Extent {
-    /// Experiments.
+    /// Number of experiments.
     pub experiments: usize,
-    /// Periods of each.
+    /// Number of periods of each experiment.
     pub periods: usize,
-    /// Samples of a period.
+    /// Number of samples of a period.
     pub samples: usize,
 }
 
-/// Plans for signals of one extent and the lines wanted.
+/// Plans for signals of one extent at the requested lines.
 #[derive(Debug, Clone)]
 pub struct LineSpectra {
     lines: Vec<usize>,
-    /// By signal; signals of as many channels share one.
+    /// One plan for each signal. Signals with the same number of channels share a plan.
     plans: Vec<Arc<LineDft>>,
 }
 
 impl LineSpectra {
-    /// For signals of these numbers of channels, periods of `samples`.
+    /// Plans for signals with these numbers of channels and periods of `samples`.
     pub fn new(channels: &[usize], samples: usize, lines: &[usize]) -> Self {
         let plan = |count: &usize| line_plan(samples, *count, lines);
         let plans = channels.iter().map(plan).collect();
@@ -47,12 +47,11 @@ impl LineSpectra {
         }
     }
 
-    /// Spectra `(experiment, period, line, channel)`, the channels of all signals side by side,
-    /// without scale.
+    /// Spectra `(experiment, period, line, channel)` without a scale factor, with the channels of
+    /// all signals side by side.
     ///
-    /// From the channels of the signals marked `true` the linear drift is removed: one slope
-    /// for each experiment and channel, from the means of its periods, none with a single
-    /// period.
+    /// The linear drift is removed from signals marked `true`. Each experiment and channel has one
+    /// slope, computed from the means of its periods. A single period has no slope.
     pub fn of(&self, signals: &[(Channels<'_>, bool)], extent: Extent, threads: Threads) -> Vec<C> {
         let channels: usize = signals.iter().map(|(s, _)| s.count).sum();
         let records = extent.experiments * extent.periods;
@@ -89,7 +88,8 @@ impl LineSpectra {
         out
     }
 
-    /// Lines and sums of record `one` and the next; the last of an odd number goes with itself.
+    /// Compute lines and sums of record `one` and the next. The last of an odd number is paired
+    /// with itself.
     fn two(
         &self,
         signals: &[(Channels<'_>, bool)],
@@ -124,7 +124,7 @@ impl LineSpectra {
     }
 }
 
-/// Subtract `slope n`, whose DFT is `slope N / (exp(-2 pi i k / N) - 1)`.
+/// Subtract the ramp `slope n`, whose DFT is `slope N / (exp(-2 pi i k / N) - 1)`.
 fn remove_drift(
     out: &mut [C],
     sums: &[f64],

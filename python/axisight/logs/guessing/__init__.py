@@ -1,4 +1,4 @@
-"""Proposing a column map for a file that has none, from its names and numbers."""
+"""Propose a column map for a file that has none, from its names and numbers."""
 
 from axisight.logs.guessing.propose import Proposal, guess_columns
 

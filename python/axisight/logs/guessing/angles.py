@@ -1,4 +1,4 @@
-"""Which columns are the positions, in which unit, and whether of motors or of joints."""
+"""Find the columns of the positions, their unit and their side (motor or joint)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ _VELOCITY_UNITS = ("rad/s", "deg/s", "rpm", "rev/s")
 
 
 def find_positions(draft: Draft) -> Family:
-    """Put axes and positions into a draft, units still open. Raises LogError listing the columns."""
+    """Return the family of the positions, and put axes and positions into the draft, units still open.
+
+    Raises LogError, listing the columns, without positions or with fewer axes than the robot has.
+    """
     found = of_quantity(draft.families, "position")
     if not found:
         wanted = of_quantity(draft.families, "position", wanted=True)
@@ -52,13 +55,13 @@ def find_positions(draft: Draft) -> Family:
 
 
 def _with_robot(draft: Draft) -> str:
-    """Return what a robot would help, where columns are measured of who knows which joint; "" otherwise."""
+    """Return advice to give a robot if columns are measured but of no known joint; "" otherwise."""
     found = measured(draft.families) if draft.robot is None else []
     return f", and --robot says whether joints are called as in {found[0].label}" if found else ""
 
 
 def _without(draft: Draft, found: list[Family]) -> str:
-    """Return which joints of the robot no position is called after, where any is; "" otherwise."""
+    """Return text that names the joints without a position; "" if no position is named after a joint."""
     joints = [] if draft.robot is None else list(draft.robot.axis_names)
     named = called_after(joints, [s.name for f in found for s in f.signals.values()])
     missing = [joint for joint in joints if joint not in named]
@@ -66,7 +69,7 @@ def _without(draft: Draft, found: list[Family]) -> str:
 
 
 def _single(draft: Draft, found: list[Family]) -> Family:
-    """Return the family that is the position; those of motors where joints are measured beside them."""
+    """Return the family of the positions, motor-side before joint-side; raise LogError for an open choice."""
     motors = [f for f in found if f.meaning.side == "motor"]
     kinds = motors if len(motors) == 1 and len(found) > 1 else found
     most = max(len(f.signals) for f in kinds)
@@ -83,7 +86,7 @@ def _single(draft: Draft, found: list[Family]) -> Family:
 
 
 def _axes(draft: Draft, family: Family) -> list[Axis]:
-    """Return the axes in order: by number, by the robot's joints, or as they come."""
+    """Return the axes in the order of the robot's joints, of their numbers, or of the file."""
     names = [] if draft.robot is None else list(draft.robot.axis_names)
     if names and set(names) <= set(family.signals):
         draft.why["axes"] = "in the order of the robot's joints, by their names"
@@ -113,7 +116,7 @@ def _axes(draft: Draft, family: Family) -> list[Axis]:
 
 
 def settle_positions(draft: Draft, family: Family) -> None:
-    """Choose unit and side of the positions of a draft that has its time."""
+    """Set unit and side of the positions; the draft must have its time."""
     unit, why = _unit(draft, family)
     size = largest(draft.signals("position"))
     units = [("m" if slides and unit not in PRISMATIC_UNITS else unit) for slides in draft.slides]
@@ -146,7 +149,7 @@ def _unit(draft: Draft, family: Family) -> tuple[str, str]:
 
 
 def _by_velocity(seen: Agreement, velocity_unit: str | None) -> str | None:
-    """Return the unit of angles that a velocity shows; None where its factor could be that of several."""
+    """Return the unit of angles that fits a velocity; None if several or no units fit."""
     named = (velocity_unit,) if velocity_unit in _VELOCITY_UNITS else _VELOCITY_UNITS
     fits = {
         unit

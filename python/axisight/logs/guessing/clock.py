@@ -1,4 +1,4 @@
-"""Which column is the time, and in which unit."""
+"""Find the column of the time and its unit."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ _RATE_NAMES = {
     "sampleratehz",
     "fsample",
 }
-# Of two units that both make sense the one whose rate is nearer to that of most logs is taken.
+# If two units make sense, the one whose rate is nearer to this typical rate wins.
 _USUAL_HZ = 250.0
 
 
 def take_time(draft: Draft, arrays: Arrays) -> None:
-    """Put the time into a draft that has positions. Raises LogError listing the columns without one."""
+    """Put the time into a draft that has positions; raise LogError, listing the columns, if there is none."""
     draft.rate_name = _rate_name(arrays)
     rate = rate_of(arrays)
     found = _candidates(draft)
@@ -55,7 +55,7 @@ def take_time(draft: Draft, arrays: Arrays) -> None:
 
 
 def rate_of(arrays: Arrays) -> float | None:
-    """Return the rate that a number of a file says [Hz]."""
+    """Return the sample rate that a scalar in the file states [Hz]; None if there is none."""
     name = _rate_name(arrays)
     return None if name is None else float(arrays[name].reshape(-1)[0])
 
@@ -82,7 +82,7 @@ def _candidates(draft: Draft) -> list[Series]:
 
 
 def _best(draft: Draft, found: list[Series]) -> Series:
-    """Return the one that stands beside the positions; raises LogError for several that differ."""
+    """Return the time column in the folder of the positions; raise LogError for several that differ."""
     beside = _folder(draft.signals("position")[0].name)
     if not all(_counts(one) for one in found):
         found = [one for one in found if not _counts(one)]
@@ -101,7 +101,7 @@ def _best(draft: Draft, found: list[Series]) -> Series:
 
 
 def _counts(series: Series) -> bool:
-    """Whether a time is the number of the sample, which is no time beside another one."""
+    """Whether a time column only counts samples; it loses to any other time column."""
     return bool((np.diff(series.values) == 1.0).all())
 
 
@@ -122,7 +122,7 @@ def _has_unit(draft: Draft, series: Series) -> bool:
 
 
 def _unit(draft: Draft, series: Series, rate_hz: float | None) -> tuple[str, str]:
-    """Return the unit of a time and why."""
+    """Return the unit of a time column and the reason; raise LogError if no unit gives a plausible rate."""
     step = float(np.median(np.diff(series.values)))
     named = _named_unit(draft, series)
     possible = time_units(series.values)
@@ -148,7 +148,7 @@ def _unit(draft: Draft, series: Series, rate_hz: float | None) -> tuple[str, str
 
 
 def _irregular(draft: Draft, time_s: np.ndarray[tuple[int], np.dtype[np.float64]]) -> bool:
-    """Whether stamps need a grid; holes are said."""
+    """Whether stamps must be resampled onto a grid; a hole in them becomes a doubt."""
     try:
         return mean_rate_hz(time_s, draft.path.name) is not None
     except LogError as error:

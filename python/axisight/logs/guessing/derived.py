@@ -1,4 +1,4 @@
-"""Positions and velocities of files whose names say nothing: one column goes with the derivative of another."""
+"""Find positions and velocities without telling names: one column follows the derivative of another."""
 
 from __future__ import annotations
 
@@ -16,21 +16,22 @@ from axisight.logs.guessing.series import Series
 from axisight.logs.log import Floats
 from axisight.logs.units import si_factor
 
-# Correlation from which on one is taken for the derivative of the other, below a fifth of the rate or that.
+# A column is the derivative of another from this correlation on, below 20 Hz or a fifth of the sample rate.
 _ALIKE, _BAND_HZ = 0.99, 20.0
-# Of two that are both like it one is taken if it lacks ten times less of a correlation of one.
+# Of two candidates, one wins if its correlation is ten times nearer to 1 than that of the other.
 _CLEARLY = 10.0
 _MOST_COLUMNS, _MOST_SAMPLES = 64, 100_000
-# By how much steps of a time differ that no name calls one, as a share of them.
+# Largest range of the steps of a time column without a name, as a share of the median step.
 _EVEN = 0.1
 _RATE_WITHOUT_TIME_HZ = 250.0
 
 
 def name_by_derivatives(draft: Draft, rate_hz: float | None) -> None:
-    """Give nameless columns of a draft without positions the quantities that their derivatives show.
+    """Mark nameless columns as positions and velocities by their derivatives, if no name says position.
 
-    ``rate_hz``: that of the file, if a column or a number says it. Columns whose derivative no other
-    goes with stay nameless. Raises LogError where two columns are as likely the position of one velocity.
+    ``rate_hz``: the sample rate that the file states, None without one. A column stays nameless if its
+    derivative correlates with no other column. Raises LogError if two columns are equally likely to be the
+    position of one velocity.
     """
     if any(family.meaning.quantity == "position" for family in draft.families):
         return
@@ -86,7 +87,7 @@ def _meaning(quantity: str) -> Meaning:
 def _time(
     draft: Draft, nameless: Sequence[Family], rate_hz: float | None
 ) -> tuple[Series | None, float | None]:
-    """Return the nameless column that is the time, and the step of samples [s]; None where there is none."""
+    """Return the nameless time column, or None, and the sample time [s], or None if no column shows it."""
     named = [s for f in of_quantity(draft.families, "time") for s in f.signals.values()]
     found = [s for s in named if increases(s.values)]
     time = None
@@ -106,7 +107,7 @@ def _time(
 
 
 def _is_even(values: Floats) -> bool:
-    """Whether values go on in even steps, and do not number the samples."""
+    """Whether values increase in even steps and do not merely count the samples."""
     if not increases(values):
         return False
     steps = np.diff(values)
@@ -118,7 +119,7 @@ def _moves(series: Series) -> bool:
 
 
 def _derivatives(signals: Sequence[Series], step_s: float) -> Floats:
-    """Return the correlation (n, n) of the derivative of each signal, along rows, with each signal."""
+    """Return the correlations (n, n) of the derivative of each signal (rows) with each signal (columns)."""
     cutoff = min(_BAND_HZ, 0.2 / step_s)
     size = signals[0].values.size
     start = max(0, (size - _MOST_SAMPLES) // 2)
@@ -136,7 +137,10 @@ def _derivatives(signals: Sequence[Series], step_s: float) -> Floats:
 
 
 def _pairs(draft: Draft, signals: Sequence[Series], alike: Floats) -> list[tuple[int, int | None]]:
-    """Return position and velocity of every axis, in the order of the file; None for a velocity that is open."""
+    """Return (position, velocity) indices of every axis in file order; None for an open velocity.
+
+    Raises LogError if two columns are equally likely to be the position of one velocity.
+    """
     like = alike > _ALIKE
     heads = [p for p in range(len(signals)) if like[p].any() and not like[:, p].any()]
     pairs: list[tuple[int, int | None]] = []
@@ -165,7 +169,7 @@ def _pairs(draft: Draft, signals: Sequence[Series], alike: Floats) -> list[tuple
 
 
 def _best(alike: Floats, among: np.ndarray[tuple[int], np.dtype[np.int64]]) -> int | None:
-    """Return the one that is most like, None where the next is about as much so."""
+    """Return the index with the highest correlation, None if the second one is about as high."""
     lacks = 1.0 - alike[among]
     order = np.argsort(lacks)
     if len(order) > 1 and lacks[order[1]] < _CLEARLY * max(lacks[order[0]], 1e-12):
@@ -176,7 +180,7 @@ def _best(alike: Floats, among: np.ndarray[tuple[int], np.dtype[np.int64]]) -> i
 def _say_third(
     draft: Draft, signals: Sequence[Series], alike: Floats, velocities: list[int], named: set[int]
 ) -> None:
-    """Say which columns go with the derivatives of velocities."""
+    """Note as unused the columns that correlate with the derivative of a velocity."""
     for k, series in enumerate(signals):
         for v in velocities:
             if id(series) not in named and alike[v, k] > _ALIKE:

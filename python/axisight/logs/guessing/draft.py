@@ -1,4 +1,4 @@
-"""What a guess has found so far: the signals of every field, why they, and what is open."""
+"""The state of a guess: the signals of every field, the reasons for them, and the open choices."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _SHOWN = 60
 
 @dataclass
 class Draft:
-    """A map in the making.
+    """A column map in progress.
 
-    ``fields`` holds one (signal, unit) per axis, ``torques`` those of which a person has to choose one, or
-    to state its scale (``scaled``: even of a torque), ``targets`` those that a person may know for targets of
-    positions. ``why`` gives the reason of a field, ``unused`` that
-    of a name that was left out. ``doubts`` are choices that others might be right for. ``by_numbers``: no
-    name said which columns are positions.
+    ``fields`` holds the chosen signals of each field, one (signal, unit) per axis. ``torques`` holds the
+    candidates among which the user must choose, or whose scale the user must state; ``scaled``: a scale is
+    needed even if the unit is Nm. ``targets`` holds candidates for position targets, which the user may
+    confirm. ``why`` gives the reason for a field, ``unused`` the reason for leaving out a name. ``doubts``
+    lists choices that may be wrong. ``by_numbers``: no name said which columns are positions.
     """
 
     path: Path
@@ -49,18 +49,18 @@ class Draft:
     doubts: list[str] = field(default_factory=list)
 
     def refusal(self, message: str) -> LogError:
-        """Return the error that says ``message`` and lists the columns of the file."""
+        """Return a LogError with ``message`` and the columns of the file."""
         listed = ", ".join(self.names[:_SHOWN]) or "none"
         more = f" and {len(self.names) - _SHOWN} more" if len(self.names) > _SHOWN else ""
         return LogError(f"{self.path}: {message}; columns: {listed}{more}")
 
     def leave(self, families: Iterable[Family], reason: str) -> None:
-        """Note why families are not used; a reason that is known stays."""
+        """Note why families are not used; an earlier reason stays."""
         for family in families:
             self.unused.setdefault(family.label, reason)
 
     def on_this_side(self, families: Iterable[Family]) -> list[Family]:
-        """Return families with a signal of every axis that are not of the other side."""
+        """Return the families that cover every axis and are not of the other side."""
         families = list(families)
         other = {"motor": "joint", "joint": "motor"}[self.side]
         self.leave([f for f in families if f.of(self.axes) is None], "not of all axes")
@@ -69,10 +69,10 @@ class Draft:
         return [f for f in whole if f.meaning.side != other]
 
     def signals(self, name: str) -> list[Series]:
-        """Return the signals of a field, by axis; none where it is not there."""
+        """Return the signals of a field in the order of the axes; [] if the draft lacks the field."""
         return [series for series, _ in self.fields.get(name, [])]
 
     def take(self, name: str, signals: list[Series], units: list[str], why: str) -> None:
-        """Take the signals of all axes as a field."""
+        """Set a field to these signals and units, one per axis, for the reason ``why``."""
         self.fields[name] = list(zip(signals, units, strict=True))
         self.why[name] = why

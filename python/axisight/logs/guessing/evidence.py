@@ -1,4 +1,4 @@
-"""What the numbers say: the unit of the time, and how position, velocity and torque go together."""
+"""Evidence from the numbers: the unit of the time, and how position, velocity and torque correlate."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from axisight.logs.log import Floats
 from axisight.logs.unit_guess import velocity_ratio
 from axisight.logs.units import si_factor
 
-# Rates that logs of robots have.
+# Sample rates that logs of robots have.
 _RATES_HZ = (2.0, 20_000.0)
 _TIME_UNITS = ("s", "ms", "us", "ns")
 _ALIKE = 0.9
-# Of all pairs of units two factors are 4.7 % apart; beside a known unit they are far apart.
+# The closest factors of two pairs of units are 4.7 % apart; if one unit is known, factors are far apart.
 PAIRS_APART = 0.02
 UNITS_APART = 0.05
 _BAND_HZ = 10.0
-# A joint in rad stays within that; more is degrees, or a motor's.
+# A joint in rad stays within this range; larger values are degrees or motor-side.
 LARGEST_JOINT_RAD = 7.0
 LARGEST_JOINT_DEG = 720.0
 
 
 def increases(values: Floats) -> bool:
-    """Whether time (n,) is finite and goes on with every sample."""
+    """Whether a time (n,) is finite and increases with every sample."""
     return values.size > 2 and bool(np.isfinite(values).all() and (np.diff(values) > 0).all())
 
 
 def time_units(values: Floats) -> list[str]:
-    """Return the units in which increasing time (n,) has a rate that logs have, slowest first."""
+    """Return the units in which an increasing time (n,) has a plausible sample rate, lowest rate first."""
     step = float(np.median(np.diff(values)))
     low, high = _RATES_HZ
     return [unit for unit in _TIME_UNITS if low <= 1.0 / (step * si_factor(unit)) <= high]
@@ -42,10 +42,10 @@ def time_units(values: Floats) -> list[str]:
 
 @dataclass(frozen=True)
 class Agreement:
-    """How velocities follow the derivatives of positions, over the axes that move.
+    """How well velocities follow the derivatives of positions, over the axes that move.
 
-    ``ratio`` is the median of velocity / derivative, in the units of the file per s; ``alike`` the least
-    correlation. ``axes`` counts those that could be compared.
+    ``ratio`` is the median of velocity / derivative over the axes, in the units of the file. ``alike`` is the
+    correlation with the smallest size. ``axes`` counts the axes that could be compared.
     """
 
     ratio: float
@@ -54,18 +54,18 @@ class Agreement:
 
     @property
     def clear(self) -> bool:
-        """Whether the one is the derivative of the other, up to a factor."""
+        """Whether the velocities are the derivatives up to a factor."""
         return self.axes > 0 and abs(self.alike) >= _ALIKE
 
     def is_factor(self, factor: float, within: float) -> bool:
-        """Whether velocities are the derivatives times ``factor``, to a share of it."""
+        """Whether the velocities are the derivatives times ``factor``, within a relative error ``within``."""
         return self.clear and abs(self.ratio / factor - 1.0) <= within
 
 
 def agreement(
     positions: Sequence[Series], velocities: Sequence[Series], sample_time_s: float
 ) -> Agreement:
-    """Compare velocities (n,) with positions (n,), axis by axis; axes with NaN or at rest are left out."""
+    """Return how velocities (n,) agree with positions (n,) over the axes that move and have no NaN."""
     ratios, alike = [], []
     for position, velocity in zip(positions, velocities, strict=True):
         if not (np.isfinite(position.values).all() and np.isfinite(velocity.values).all()):
@@ -86,7 +86,7 @@ def agreement(
 def follows_acceleration(
     positions: Sequence[Series], torques: Sequence[Series], sample_time_s: float
 ) -> list[float]:
-    """Return the correlation of torque with acceleration of each axis that can be compared."""
+    """Return the correlation of torque with acceleration for each axis that can be compared."""
     found = []
     cutoff = min(_BAND_HZ, 0.2 / sample_time_s)
     for position, torque in zip(positions, torques, strict=True):
@@ -105,6 +105,6 @@ def follows_acceleration(
 
 
 def largest(signals: Sequence[Series]) -> float:
-    """Return the largest size of any value; 0 without finite ones."""
+    """Return the largest absolute value of all signals; 0 if none is finite."""
     sizes = [np.abs(s.values[np.isfinite(s.values)]).max(initial=0.0) for s in signals]
     return float(max(sizes, default=0.0))

@@ -1,4 +1,4 @@
-"""Signals of one kind, one for each axis, and which of several kinds a map should take."""
+"""Group signals into families: signals of one kind, one per axis."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ Axis = int | str
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """The signals of one name, by axis; ``meaning`` is that of the first."""
+    """Signals whose names differ only in the axis, by axis; ``meaning`` is that of the first."""
 
     meaning: Meaning
     signals: dict[Axis, Series] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
-        """The name of the first, and how many there are."""
+        """The name of the first signal and the number of the others, for messages."""
         first = next(iter(self.signals.values())).label
         return first if len(self.signals) == 1 else f"{first} and {len(self.signals) - 1} like it"
 
     def of(self, axes: Sequence[Axis]) -> list[Series] | None:
-        """Return the signals of axes, None unless all have one."""
+        """Return the signals of these axes, in order; None unless every axis has one."""
         return [self.signals[a] for a in axes] if set(axes) <= set(self.signals) else None
 
 
 def families_of(series: Iterable[Series], joints: Sequence[str] = ()) -> list[Family]:
-    """Return the families of signals; names without a number are of one family only beside another.
+    """Return the families of signals; ``joints`` are the joint names of the robot.
 
-    ``joints``: names of joints of the robot. `theta_a, theta_b` alone are two sensors of one axis; with
-    `tau_a, tau_b` they are two axes.
+    Names without a number form a family only if another family has the same axes. So `theta_a, theta_b` alone
+    are two sensors of one axis; beside `tau_a, tau_b` they are two axes.
     """
     found: dict[tuple[str, bool | None, str | None, str], Family] = {}
     for one in series:
@@ -58,10 +58,9 @@ def families_of(series: Iterable[Series], joints: Sequence[str] = ()) -> list[Fa
 def of_quantity(
     families: Iterable[Family], quantity: str, *, wanted: bool | None = False
 ) -> list[Family]:
-    """Return the families of a quantity, those that say that they are measured before those that do not.
+    """Return the families of a quantity: those named as measured, or if there are none, the unmarked ones.
 
-    ``wanted``: targets instead. Only the best kind that there is comes back: several are a choice that the names
-    leave open.
+    ``wanted=True`` returns targets instead. More than one family means that the names leave a choice open.
     """
     named = [f for f in families if f.meaning.quantity == quantity]
     if wanted:

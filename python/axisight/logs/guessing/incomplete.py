@@ -1,4 +1,4 @@
-"""What a person has to fill in before a log is read by the map of a guess."""
+"""Say what the user must fill in before a guessed map can read a log."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from axisight.logs.guessing.draft import Draft
 
 
 def still_needed(draft: Draft) -> str | None:
-    """Return what is to be done; None for a map with torques, or with targets of positions, of all axes."""
+    """Return what the user must add to the map; None if all axes have torques or position targets."""
     if "torque" in draft.fields or "position_ref" in draft.fields:
         return None
     ways = []

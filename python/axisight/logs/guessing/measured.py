@@ -1,4 +1,4 @@
-"""Positions whose names say which joint they are measured of, and nothing else."""
+"""Find positions whose names say only that they are measured and at which joint."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from axisight.logs.units import POSITION_UNITS
 
 
 def name_by_joints(draft: Draft) -> None:
-    """Take for positions what is called measured and after the joints of the robot, where no name says them.
+    """Mark as positions the columns named only as measured and by joint, if no name says position.
 
-    Only columns of all joints, of one kind, in no other unit than positions have: a choice stays open.
+    This needs a robot and exactly one family that covers all its joints, without a unit or in a unit of
+    positions. Otherwise nothing changes.
     """
     if draft.robot is None or of_quantity(draft.families, "position"):
         return
@@ -30,7 +31,7 @@ def name_by_joints(draft: Draft) -> None:
 
 
 def measured(families: list[Family]) -> list[Family]:
-    """Return the families whose names say that they are measured, and not what they are."""
+    """Return the families whose names say that they are measured but not which quantity."""
     return [
         family
         for family in of_quantity(families, "")

@@ -1,4 +1,4 @@
-"""Whether the names of a file are those of a maker whose map ships with the package."""
+"""Find the shipped map that fits the names and numbers of a file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ _ALIKE = 0.9
 
 @dataclass(frozen=True)
 class Fit:
-    """A shipped map that fits; ``axes`` are those to take where the file has more than the robot."""
+    """A shipped map that fits a file with ``in_file`` axes.
+
+    ``axes`` is the number of axes to take if the file has more than the robot, else None.
+    """
 
     name: str
     in_file: int
@@ -33,10 +36,10 @@ class Fit:
 
 
 def named_map(arrays: Arrays, robot: Robot | None, path: Path) -> tuple[Fit | None, list[str]]:
-    """Return the map whose names a file has all, and why numbers speak against others that have them.
+    """Return the shipped map that fits, or None and the reasons against maps whose names match.
 
-    A map fits with time, and position and torque of every axis, in the units that it states; of more axes
-    than the robot has the first are taken.
+    A map fits if the file has its time and the position and torque of every axis, and if the numbers agree
+    with its units. If the file has more axes than the robot, the map takes the first ones.
     """
     against = []
     for name in MAPS:
@@ -64,7 +67,7 @@ def named_map(arrays: Arrays, robot: Robot | None, path: Path) -> tuple[Fit | No
 
 
 def _all_there(columns: ColumnMap, arrays: Arrays, field: str) -> bool:
-    """Whether a file has the time, and a signal of every axis."""
+    """Whether a file has the time of a map and this field as numbers for every axis."""
     if columns.time is None or columns.time.name not in arrays:
         return False
     wanted = [getattr(axis, field) for axis in columns.axis]
@@ -75,7 +78,7 @@ def _all_there(columns: ColumnMap, arrays: Arrays, field: str) -> bool:
 
 
 def _contradiction(columns: ColumnMap, arrays: Arrays) -> str | None:
-    """Return what the numbers say against the units of a map."""
+    """Return how the numbers contradict the units of a map; None if they do not."""
     time = columns.time
     assert time is not None
     stamps = np.asarray(arrays[time.name], dtype=np.float64)

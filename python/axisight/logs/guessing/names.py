@@ -1,4 +1,4 @@
-"""What the name of a column says: quantity, measured or wanted, unit, axis, motor or joint."""
+"""Read the name of a column: quantity, measurement or target, unit, axis, motor or joint."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from axisight.logs.guessing.series import Series
 
 _TOKEN = re.compile(r"[mk]Nm|m[AV](?![a-z])|[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 _BRACKET = re.compile(r"[\[(]\s*(1/min|[^\])\d][^\])]*?)\s*[\])]")
-# A1, J1: the letter is the axis, no ampere.
+# In A1 and J1 the letter means the axis, not ampere.
 _AXIS_LETTER = re.compile(r"(?<![A-Za-z])[AaJj](?=\d|#)")
 
 
@@ -29,16 +29,16 @@ WORDS = {
     "position": "q qm qpos pos position positions angle angles theta phi enc encoder",
     "time": "time timestamp timestamps stamp t ts tm clock ipoc sec secs seconds ms msec us usec ns nsec",
 }
-"""Words for each quantity, in the order in which quantities win where a name has words of several."""
+"""Words for each quantity; if a name has words of several quantities, the first quantity wins."""
 _QUANTITIES = {word: quantity for quantity, words in WORDS.items() for word in words.split()}
-# Words that alone are a position, where nothing else is one; LeRobot has states and actions.
+# Words that mean a position if the name has no word of a quantity; LeRobot has states and actions.
 _PLACES = {"joint", "joints", "axis", "state", "action"}
 _MEASURED = _words("actual act measured meas feedback fb present real ist")
 _WANTED = _words(
     "target ref reference cmd command commanded des desired set setpoint goal soll planned action computed cmptd "
     "calc calculated"
 )
-# What is none of an axis, or no measurement: of the tool, computed by a model, a bound.
+# Signals that do not belong to an axis or are not measured: of the tool, computed by a model, bounds.
 _OTHER = _words(
     "ext external tcp ee pose cartesian tool wrench hat gripper finger min max limit std var mode status "
     "ff grav gravity coriolis friction model init kin"
@@ -64,20 +64,20 @@ _UNITS = {
     "us": "us", "usec": "us", "micros": "us", "µs": "us", "microseconds": "us",
     "ns": "ns", "nsec": "ns", "nanos": "ns", "nanoseconds": "ns", "nanosec": "ns",
 }  # fmt: skip
-# Units that maps do not have: what bears one waits for a person and a scale.
+# Units that maps do not support: the user must state a scale for such a column.
 _FOREIGN = _words("mnm knm ncm kn mrad mdeg arcmin arcsec ma mv cm krpm percent pct hz")
-# Single letters are units in brackets, or at the end of a name of that quantity.
+# A single letter is a unit only in brackets, or at the end of a name of its quantity.
 _LETTERS = {"m": "m", "n": "N", "a": "A", "v": "V", "s": "s", "c": "degC", "k": "K", "m s": "m/s"}
 _LETTER_OF = {"s": "time", "a": "current", "v": "voltage", "m s": "velocity", "c": "temperature"}
 
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a name says; None where it does not.
+    """What a name says; a field is None if the name does not say it.
 
-    ``quantity`` is "" for none, "other" for what is none of an axis; ``unit`` may be one that maps do not
-    have; ``wanted`` tells a target from a measurement; ``axis`` is its number as it stands there, or what
-    is left of the name; ``stem`` is shared by the axes of one family.
+    ``quantity`` is "" if unknown, "other" for signals that do not belong to an axis. ``wanted`` is True for a
+    target, False for a measurement. ``unit`` may be one that maps do not support. ``axis`` is the number in
+    the name, the joint, or the rest of the name. ``stem`` is the same for all axes of one family.
     """
 
     quantity: str
@@ -89,7 +89,7 @@ class Meaning:
 
 
 def meaning_of(series: Series, joints: Sequence[str] = ()) -> Meaning:
-    """Return what the name of a signal says; ``joints`` are names that may stand for the axis."""
+    """Return what the name of a signal says; ``joints`` are the joint names that may stand for the axis."""
     name = series.name
     bracket = next((m for m in _BRACKET.finditer(name) if _bracket_unit(m[1])), None)
     unit = _bracket_unit(bracket[1]) if bracket is not None else None
@@ -120,10 +120,10 @@ def _bracket_unit(text: str) -> str | None:
 
 
 def joint_in(name: str, joints: Sequence[str]) -> tuple[str, re.Match[str]] | None:
-    """Return which of the joints a signal is called after, and where that stands in its name, as words.
+    """Return the joint that a signal is named after and the match in its name; None without one.
 
-    Joints as they are written come before those in other letters or without their `joint`: `Elbow_angle`,
-    of `elbow_joint`. Of several the longest is meant.
+    Exact names win over names in another case or without the word `joint` (`Elbow_angle` for `elbow_joint`).
+    Among several matches, the longest wins.
     """
     ways: list[tuple[dict[str, str], re.RegexFlag]] = [
         ({joint: joint for joint in joints}, re.NOFLAG),
@@ -138,18 +138,18 @@ def joint_in(name: str, joints: Sequence[str]) -> tuple[str, re.Match[str]] | No
 
 
 def called_after(joints: Sequence[str], names: Iterable[str]) -> list[str]:
-    """Return the joints that any of the names has in it, in their order."""
+    """Return the joints that occur in any of the names, in the order of ``joints``."""
     found = {match[0] for name in names if (match := joint_in(name, joints))}
     return [joint for joint in joints if joint in found]
 
 
 def _bare(joints: Sequence[str]) -> dict[str, str]:
-    """Return the joints by their names in small letters, whole and without `joint`; none for what two share."""
+    """Return joints by lower-case name, whole and without `joint`, except names that two joints share."""
     found: dict[str, set[str]] = {}
     for joint in joints:
         whole = joint.lower()
         bare = whole.removesuffix("_joint").removeprefix("joint_")
-        # A number or a letter alone stands for anything.
+        # A lone number or letter is too ambiguous to name a joint.
         enough = len(bare) > 1 and any(c.isalpha() for c in bare)
         for words in {whole, bare} if enough else {whole}:
             found.setdefault(words, set()).add(joint)
@@ -157,7 +157,7 @@ def _bare(joints: Sequence[str]) -> dict[str, str]:
 
 
 def _axis(name: str, row: int | None, joints: Sequence[str]) -> tuple[int | str, str]:
-    """Return number or joint of the axis, and the name without it."""
+    """Return the number or joint of the axis ("" if there is none), and the name with `#` in its place."""
     if row is not None:
         return row, name
     if found := joint_in(name, joints):
@@ -171,7 +171,7 @@ def _axis(name: str, row: int | None, joints: Sequence[str]) -> tuple[int | str,
 
 
 def _quantity(words: Sequence[str]) -> tuple[str, set[str]]:
-    """Return the quantity of the words, and those that say it."""
+    """Return the quantity that the words name, and the words that name it."""
     named = {word: _QUANTITIES[word] for word in words if word in _QUANTITIES}
     for quantity in WORDS:
         if quantity in named.values():
@@ -181,7 +181,7 @@ def _quantity(words: Sequence[str]) -> tuple[str, set[str]]:
 
 
 def _word_unit(words: list[str], quantity: str) -> tuple[str | None, list[str]]:
-    """Return the unit that stands in the words, and the other words."""
+    """Return the unit among the words, or None, and the other words."""
     for size in (3, 2, 1):
         for start in range(0 if len(words) == size else 1, len(words) - size + 1):
             key = " ".join(words[start : start + size])

@@ -1,4 +1,4 @@
-"""Which columns are velocities, their references, torques, temperatures: by name, and by what positions do."""
+"""Find velocities, their references, torques and temperatures, by name and by the motion of the positions."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from axisight.logs.units import PRISMATIC_UNITS, si_factor
 
 _TURNING = ("rad/s", "deg/s", "rpm", "rev/s")
 _SLIDING = ("m/s", "mm/s")
-# A column that no name explains is offered as a torque when it follows the acceleration that closely.
+# A column without a meaning is mentioned as a torque from this correlation with the acceleration on.
 _LIKELY = 0.5
 
 
 def take_velocity(draft: Draft, field: str) -> None:
-    """Take `velocity` or `velocity_ref` where the numbers bear a column out, and say why where not."""
+    """Take `velocity` or `velocity_ref` if the numbers agree with the name; otherwise note the reason."""
     families = of_quantity(draft.families, "velocity", wanted=field == "velocity_ref")
     good: list[tuple[Family, list[Series], list[str], str]] = []
     for family in draft.on_this_side(families):
@@ -44,7 +44,7 @@ def take_velocity(draft: Draft, field: str) -> None:
 def _velocity_units(
     draft: Draft, family: Family, signals: list[Series]
 ) -> tuple[list[str], str] | str:
-    """Return the unit of every axis and why, or why the velocities cannot be those of the positions."""
+    """Return the unit of every axis and the reason, or why these cannot be velocities of the positions."""
     seen = agreement(draft.signals("position"), signals, draft.sample_time_s)
     named = family.meaning.unit
     units = [unit for _, unit in draft.fields["position"]]
@@ -54,7 +54,7 @@ def _velocity_units(
         return [named] * len(units), f"the name says {named} (no motion to compare)"
     if not seen.clear:
         return f"does not follow the derivative of the position (correlation {seen.alike:.2f})"
-    # Axes of both kinds have two factors: SI of both, or nothing.
+    # Revolute and prismatic axes have different factors, so with both kinds only SI units can be recognized.
     both = len({unit in PRISMATIC_UNITS for unit in units}) > 1
     position = units[0]
     possible = _SLIDING if position in PRISMATIC_UNITS else _TURNING
@@ -69,7 +69,7 @@ def _velocity_units(
 
 
 def take_torque(draft: Draft) -> None:
-    """Take the torques; currents and voltages stay open, for only a person knows the Nm per A or V."""
+    """Take the torques; leave currents and voltages open, as only the user knows the Nm per A or V."""
     for quantity, wanted in (
         ("torque", False), ("torque", True), ("current", False), ("current", True), ("voltage", False),
     ):  # fmt: skip
@@ -127,7 +127,7 @@ def _leave_open(draft: Draft, family: Family, quantity: str) -> None:
 
 
 def _likely(draft: Draft) -> str:
-    """Return what is to be said of columns without a meaning that follow the acceleration."""
+    """Return text that names the columns without a meaning that follow the acceleration; "" if none do."""
     said = []
     for family in draft.families:
         signals = family.of(draft.axes) if family.meaning.quantity == "" else None
@@ -139,7 +139,7 @@ def _likely(draft: Draft) -> str:
 
 
 def take_joint_positions(draft: Draft) -> None:
-    """Take positions of joints beside those of motors, in a unit that their names say."""
+    """Take joint-side positions beside motor-side ones if there is one family and its names give the unit."""
     if draft.side != "motor":
         return
     found = [f for f in of_quantity(draft.families, "position") if f.meaning.side == "joint"]
@@ -158,7 +158,7 @@ def take_joint_positions(draft: Draft) -> None:
 
 
 def take_temperature(draft: Draft) -> None:
-    """Take temperatures of all axes."""
+    """Take the first family of temperatures that covers all axes; the unit is by name or by size."""
     for family in of_quantity(draft.families, "temperature"):
         signals = family.of(draft.axes)
         if signals is not None and "temperature" not in draft.fields:

@@ -1,4 +1,4 @@
-"""From a file to a column map for it."""
+"""Propose a column map for a file."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from axisight.logs.sources import load_arrays
 from axisight.robot import Robot
 
 _NATIVE = ({"time_s", "position_1", "torque_cmd_1"}, {"time_s", "position_1", "position_ref_1"})
-# Why a signal with that quantity in its name is not used, unless something better is known.
+# Default reason for not using a signal, by the quantity in its name.
 _REASONS = {
     "": "no word of its name is known",
     "other": "of the tool, computed, or a bound, by its name",
@@ -44,12 +44,12 @@ _REASONS = {
 
 @dataclass(frozen=True)
 class Proposal:
-    """A proposed map: its TOML, and the map that this is.
+    """A proposed column map: its TOML ``text``, and the same map parsed (``columns``).
 
-    ``named`` is the shipped map whose names the file has, None without one; then it is that map, but for
-    `axes` where the robot has fewer. ``doubts`` are choices that
-    others might be right for, ``unused`` says of every name that was left out why. ``missing`` is what a
-    person has to fill in before a log is read by the map; None where it is complete.
+    ``named`` is the name of the shipped map that fits the file, else None. If it is set, the proposal is that
+    map, with `axes` if the robot has fewer than the file. ``doubts`` lists choices that may be wrong.
+    ``unused`` gives the reason for every name that was left out. ``missing`` says what the user must add
+    before the map can read a log; it is None if the map is complete.
     """
 
     text: str
@@ -61,18 +61,20 @@ class Proposal:
 
 
 def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
-    """Propose a column map for a log without one, from the names of its columns and their numbers.
+    """Return a proposed column map for the log at ``path``, from the names and numbers of its columns.
 
-    Names give quantity, axis and, with a suffix or in brackets, unit. Numbers give units that no name says: of
-    the time by its steps, of angles and speeds as one is the derivative of the other, or by size. Where names
-    say no position, a column whose derivative another one goes with is proposed for one, if no other is as
-    likely. Velocities that are no such derivatives, and what could be one of several columns, are left out
-    and said. ``robot`` gives the number, names and kinds of the axes; what is called measured and after its
-    joints, and nothing else, is proposed for positions.
+    Names give the quantity, the axis and, as a suffix or in brackets, the unit. Numbers give the units that
+    names lack: the unit of time from its steps, units of angles and speeds from their derivatives or sizes.
+    If no name says position, a column whose derivative correlates with another column is proposed as the
+    position, unless a second column is equally likely. The proposal leaves out velocities that do not match
+    the derivative and fields with several candidates, and says so in ``doubts``.
 
-    Raises LogError, listing the columns seen, when no time or no position of any axis is found, and when
-    there are fewer axes than those of the robot; for a file that needs no map; and as `read_log` for a
-    file that cannot be read.
+    ``robot`` gives the number, names and kinds of the axes. With it, columns named only as measured and by
+    joint are proposed as positions.
+
+    Raises LogError, listing the columns seen, when no time or no position is found and when there are fewer
+    axes than the robot has. Raises LogError also for a file that needs no map, and as `read_log` for a file
+    that cannot be read.
     """
     path = Path(path)
     opened, csv = _opened(path)
@@ -86,7 +88,7 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     unused |= unread
     joints = [] if robot is None else list(robot.axis_names)
     if not set(joints) <= set(called_after(joints, [one.name for one in series])):
-        # Names of another arm: one that both have would be an axis apart.
+        # Names of another arm: a name that both arms share could be of another axis.
         joints = []
     families = families_of(series, joints)
     draft = Draft(path, csv, list(arrays), families, robot, unused=unused, doubts=against)
@@ -108,7 +110,7 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
 
 
 def _native(path: Path, arrays: LazyArrays) -> Proposal:
-    """Return the map of a file with native columns, which needs one where its stamps are not uniform."""
+    """Return the map of a file with native columns; raise LogError if uniform stamps make it unnecessary."""
     text = uneven_text(arrays, path)
     if text is None:
         raise LogError(
@@ -118,7 +120,7 @@ def _native(path: Path, arrays: LazyArrays) -> Proposal:
 
 
 def _named(path: Path, fit: Fit) -> Proposal:
-    """Return a shipped map as it is, or with the number of axes that the robot has."""
+    """Return a shipped map, with the number of axes of the robot if the file has more."""
     head = f"# The names of {path.name} are all those of this map, which ships as {fit.name}"
     if fit.axes is None:
         head += f":\n# --columns {fit.name} does without this file.\n#\n"
@@ -130,7 +132,7 @@ def _named(path: Path, fit: Fit) -> Proposal:
 
 
 def _opened(path: Path) -> tuple[LazyArrays, CsvOptions]:
-    """Return the arrays of a file, of a CSV with the separator and decimal mark that its header shows."""
+    """Return the arrays of a file and the CSV options found; the default options for other formats."""
     if path.suffix.lower() != ".csv":
         return load_arrays(path), CsvOptions()
     arrays = load_arrays(path, CsvOptions(separator="auto"))
@@ -152,7 +154,7 @@ def load_header(path: Path, separator: str) -> list[str]:
 
 
 def _leave_rest(draft: Draft) -> None:
-    """Give every signal that is not used a reason."""
+    """Note a reason for every signal that is not used."""
     used = {id(one) for field in draft.fields for one in draft.signals(field)}
     used |= {id(one) for signals in draft.torques for one, _ in signals}
     for family in draft.families:

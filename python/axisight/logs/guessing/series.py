@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from axisight.logs.log import Floats
 
-# Matrices with more signals than that are no signals of axes.
+# A matrix with more signals than this does not hold signals of axes.
 _MOST = 32
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """One signal (n,) and its address: ``index`` picks it from a matrix, ``row`` is its place there."""
+    """One signal (n,) and its address: ``index`` selects it from a matrix, ``row`` is its number there."""
 
     name: str
     values: Floats
@@ -32,9 +32,9 @@ class Series:
 
 
 def series_of(arrays: Mapping[str, NDArray[Any]]) -> tuple[list[Series], dict[str, str]]:
-    """Return the signals of a file, and why other arrays are none, by name.
+    """Return the signals of a file, and by name the reasons why other arrays are not signals.
 
-    Signals have as many samples as most arrays of the file have.
+    The most frequent length of the arrays is taken as the number of samples.
     """
     lengths = Counter(
         max(values.shape) for values in arrays.values() if values.ndim in (1, 2) and values.size > 1

@@ -1,4 +1,4 @@
-"""Which columns are targets of positions: by name, or since the positions follow them."""
+"""Find the targets of positions, by name or because the positions follow them."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from axisight.logs.guessing.families import Family, of_quantity
 from axisight.logs.guessing.series import Series
 from axisight.logs.units import POSITION_UNITS
 
-# What is told and what is done are alike: slope and correlation of one on the other.
+# Slope and correlation of the measured signal on its target from which on it follows the target.
 _FOLLOWED = (0.8, 1.25)
 _ALIKE = 0.8
-# What else a target could be one of.
+# Other quantities that a target may be for.
 _OTHERS = ("velocity", "torque", "current", "voltage")
 
 
 def take_targets(draft: Draft) -> None:
-    """Take targets of positions where positions follow them in their own unit.
+    """Take `position_ref` if the positions follow a target in their own unit.
 
-    A target whose name does not say of what is one of positions where they follow it and nothing else that
-    is logged of these axes does. What stays open is offered, for a person to take.
+    A target whose name gives no quantity counts if the positions follow it and no other measured quantity
+    does. Open choices are offered to the user as comments in the map.
     """
     named = draft.on_this_side(of_quantity(draft.families, "position", wanted=True))
     bare = draft.on_this_side(
@@ -50,7 +50,7 @@ def _take(draft: Draft, family: Family) -> None:
 
 
 def _leave(draft: Draft, named: list[Family], bare: list[Family]) -> None:
-    """Say why targets are not taken, and offer them where a map has nothing else to be read by."""
+    """Note why targets are not taken, and offer them if the map has neither torques nor targets."""
     taken = {id(series) for series in draft.signals("position_ref")}
     rest = [f for f in (*named, *bare) if not any(id(s) in taken for s in f.signals.values())]
     new = [family for family in rest if family.label not in draft.unused]
@@ -67,12 +67,12 @@ def _leave(draft: Draft, named: list[Family], bare: list[Family]) -> None:
             why = "a target, no name says of what, beside one of positions"
         draft.leave([family], why)
     if not (taken or draft.targets or "torque" in draft.fields):
-        # Beside torques that wait for a scale only what positions follow is worth a line.
+        # If torques only lack a scale, a target is worth a line only if the positions follow it.
         _offer(draft, [f for f in new if not draft.torques or _leads(draft, f, "position")])
 
 
 def _offer(draft: Draft, families: list[Family]) -> None:
-    """Offer targets in the unit of their name, else of the positions."""
+    """Offer targets to the user, in the unit of their name, else in that of the positions."""
     for family in families:
         named = family.meaning.unit if family.meaning.unit in POSITION_UNITS else None
         units = [named or unit for _, unit in draft.fields["position"]]
@@ -92,7 +92,7 @@ def _is_only_of_positions(draft: Draft, family: Family) -> bool:
 
 
 def _leads(draft: Draft, target: Family, quantity: str) -> bool:
-    """Whether a quantity of all axes, measured, follows a target in its own unit."""
+    """Whether the measured quantity of all axes follows a target in the unit of that quantity."""
     targets = _signals(draft, target)
     if quantity == "position":
         return _followed(draft.signals("position"), targets)
@@ -101,7 +101,7 @@ def _leads(draft: Draft, target: Family, quantity: str) -> bool:
 
 
 def _followed(measured: list[Series], targets: list[Series]) -> bool:
-    """Whether every axis that is told to move does so, by as much, and any is told to."""
+    """Whether every axis with a moving target follows it by about as much, and at least one target moves."""
     moved = False
     for done_series, told_series in zip(measured, targets, strict=True):
         told = told_series.values - told_series.values.mean()

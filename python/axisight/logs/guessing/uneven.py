@@ -1,4 +1,4 @@
-"""The map of a log with native columns whose stamps are not uniform: it says the rate, and the rest as it is."""
+"""The map for a log with native columns and irregular stamps: it adds the rate for resampling."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from axisight.logs.native import native_map
 
 
 def uneven_text(arrays: LazyArrays, path: Path) -> str | None:
-    """Return the TOML of the map; None for uniform stamps, which need none.
+    """Return the TOML of the map; None if the stamps are uniform and need no map.
 
     Raises LogError for a hole in the stamps, and as `native_map`.
     """

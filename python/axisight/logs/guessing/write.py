@@ -1,4 +1,4 @@
-"""The TOML of a guess: every choice with its reason beside it, and what was left out."""
+"""Write a guess as TOML: every choice with its reason, and the columns left out."""
 
 from __future__ import annotations
 
@@ -80,5 +80,5 @@ def _csv(options: CsvOptions) -> list[str]:
 
 
 def _comments(mark: str, lines: Iterable[str]) -> list[str]:
-    # Names are those of a file: a line break in one must not end the comment.
+    # Names come from a file: a line break in one must not end the comment.
     return [f"# {mark}{' '.join(line.split())}" for line in lines]

@@ -1,4 +1,4 @@
-"""Column maps that ship with the package: the names that makers and recorders give their signals."""
+"""Column maps that ship with the package, for the signal names of robot makers and recorders."""
 
 from importlib import resources
 

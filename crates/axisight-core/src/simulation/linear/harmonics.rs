@@ -1,15 +1,18 @@
 //! Sines and cosines of many multiples of one angle.
 //!
-//! One sine and cosine of the motor angle give `z = e^{i phi}`; whole orders are products
-//! `z^{a+b} = z^a z^b` or `z^{a-b} = z^a conj(z^b)` along an addition-subtraction chain
-//! built once. Errors add up along the chain: with 3e-16 for `z` and 1.5e-16 relative per
-//! product, order `n` is good to about `n * 5e-16` (4e-14 for 72), whatever the
-//! angle; the sine of the rounded product `n phi` is off by `1e-16 n phi`.
+//! One sine and cosine of the motor angle give `z = e^{i phi}`. Whole orders are products
+//! `z^{a+b} = z^a z^b` or `z^{a-b} = z^a conj(z^b)` along an addition-subtraction chain, which is
+//! built once.
+//!
+//! Errors add up along the chain. With 3e-16 for `z` and a relative 1.5e-16 per product, order `n`
+//! has an error of about `n * 5e-16` (4e-14 for 72) at any angle. The sine of the rounded product
+//! `n phi` has an error of `1e-16 n phi`.
 
 use axisight_scalar::Scalar;
 use std::collections::{BTreeMap, HashSet};
 
-/// `powers[next] = powers[left] * powers[right]`, the right one conjugated or not.
+/// The product `powers[next] = powers[left] * powers[right]`, with the right factor conjugated or
+/// not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Product {
     left: usize,
@@ -17,7 +20,7 @@ struct Product {
     conjugate: bool,
 }
 
-/// One harmonic: the power it uses, and what cosine and sine contribute.
+/// One harmonic: its power, and the weights of cosine and sine.
 #[derive(Debug, Clone, Copy)]
 struct Term {
     power: usize,
@@ -26,7 +29,7 @@ struct Term {
 }
 
 impl Term {
-    /// `None` for an order of zero, which is no harmonic.
+    /// A harmonic, or `None` for an order of zero, which switches it off.
     fn new(order: f64, cosine: f64, sine: f64, powers: &[f64]) -> Option<Self> {
         #[allow(clippy::float_cmp)] // looked up, not computed
         let power = powers.iter().position(|v| *v == order)?;
@@ -38,14 +41,14 @@ impl Term {
     }
 }
 
-/// Value and slope over the motor angle of a sum of harmonics.
+/// Value of a sum of harmonics, and its slope over the motor angle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wave<S> {
     pub(super) value: S,
     pub(super) slope: S,
 }
 
-/// What repeats with the motor angle of one axis, at one angle.
+/// Periodic errors of one axis at one motor angle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ripple<S> {
     /// Torque ripple [Nm].
@@ -56,7 +59,7 @@ pub(super) struct Ripple<S> {
     pub(super) resolver: Wave<S>,
 }
 
-/// Ripple parameters of one axis: triples `[n, c, s]`, `n` of zero for none.
+/// Ripple parameters of one axis, as triples `[n, c, s]`; an order `n` of zero is switched off.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RippleTable {
     /// Torque ripple [Nm].
@@ -83,12 +86,14 @@ struct Terms {
     resolver: Vec<Term>,
 }
 
-/// Ripple of all axes over one chain: axes mostly have the same orders, and going through
-/// the chain abreast hides the latency of its products.
+/// Ripple of all axes over one chain.
+///
+/// Axes mostly have the same orders, and evaluating them side by side hides the latency of the
+/// products.
 #[derive(Debug, Clone)]
 pub(super) struct Waves {
     chain: Vec<Product>,
-    /// Orders that are not whole, evaluated directly, stored after the chain.
+    /// Orders that are not whole. They are evaluated directly and stored after the chain.
     direct: Vec<f64>,
     axes: Vec<Terms>,
     /// Highest order.
@@ -134,13 +139,13 @@ impl Waves {
         self.axes.iter().any(acts)
     }
 
-    /// Scratch numbers [`Waves::evaluate`] needs.
+    /// Number of scratch entries that [`Waves::evaluate`] needs.
     pub(super) fn scratch(&self) -> usize {
         (1 + self.chain.len() + self.direct.len()) * self.axes.len()
     }
 
-    /// Arithmetic operations of one evaluation: 33 per sine and cosine pair, 4 per
-    /// product, 4 per term.
+    /// Arithmetic operations of one evaluation: 33 per pair of sine and cosine, 4 per product, 4
+    /// per term.
     pub(super) fn operations(&self) -> usize {
         if self.is_empty() {
             return 0;
@@ -151,7 +156,7 @@ impl Waves {
         self.axes.len() * per_axis + 4 * all
     }
 
-    /// All sums at motor angles `angles` [rad], one per axis.
+    /// Evaluate all sums at the motor angles `angles` [rad], one per axis.
     #[inline(always)]
     pub(super) fn evaluate<S: Scalar>(
         &self,
@@ -210,7 +215,7 @@ fn sum<S: Scalar>(terms: &[Term], powers: &[[S; 2]], m: usize, axis: usize) -> W
 }
 
 impl<S: Scalar> Wave<S> {
-    /// At an angle `by` further on [rad], to first order.
+    /// The wave at an angle that is larger by `by` [rad], to first order.
     #[inline(always)]
     fn moved(self, by: S) -> Self {
         Self {
@@ -234,7 +239,7 @@ impl<S: Scalar> Ripple<S> {
         }
     }
 
-    /// At an angle `by` further on [rad], to first order.
+    /// The ripple at an angle that is larger by `by` [rad], to first order.
     #[inline(always)]
     pub(super) fn moved(self, by: S) -> Self {
         Self {
@@ -256,15 +261,15 @@ impl<S: Scalar> Ripple<S> {
 
 /// `order` as a whole number, if it is one.
 fn whole_order(order: f64) -> Option<u32> {
-    // Orders are bounded by 500 in the effect table.
+    // The cast is safe: the effect table limits orders to 500.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let whole = order as u32;
     #[allow(clippy::float_cmp)]
     (whole > 0 && f64::from(whole) == order).then_some(whole)
 }
 
-/// Exponents reached from 1, in order, and the products that reach all but the first;
-/// the shorter of two greedy searches.
+/// Exponents reached from 1, in order, and the products that give all but the first. It is the
+/// shorter result of two greedy searches.
 fn addition_chain(targets: &[u32]) -> (Vec<u32>, Vec<Product>) {
     let (small, large) = (greedy_chain(targets, false), greedy_chain(targets, true));
     if small.0.len() <= large.0.len() {
@@ -274,9 +279,13 @@ fn addition_chain(targets: &[u32]) -> (Vec<u32>, Vec<Product>) {
     }
 }
 
-/// Adds targets one product away; failing that, the exponent that brings most targets one
-/// product away (the largest or smallest of equals); failing that, the one nearest to the
-/// smallest target, which always gets nearer because 1 is among the exponents.
+/// One greedy search. Each round adds the first exponent of this list that exists:
+///
+/// * a target that is one product away;
+/// * the exponent that brings the most targets one product away (of equals, the largest or the
+///   smallest);
+/// * the exponent nearest to the smallest target. It always gets nearer, because 1 is among the
+///   exponents.
 fn greedy_chain(targets: &[u32], prefer_large: bool) -> (Vec<u32>, Vec<Product>) {
     let (mut reached, mut products) = (vec![1_u32], Vec::new());
     loop {
@@ -287,7 +296,7 @@ fn greedy_chain(targets: &[u32], prefer_large: bool) -> (Vec<u32>, Vec<Product>)
         let candidates = one_product_away(&reached);
         let is_reached: HashSet<u32> = reached.iter().copied().collect();
         let target = candidates.iter().find(|(n, _)| targets.contains(n));
-        // Targets that `n` and something reached would give.
+        // Number of targets that `n` and a reached exponent would give.
         let known = |n: u32| is_reached.contains(&n);
         let gain = |n: u32| {
             let away = |t: u32| t == 2 * n || known(t.abs_diff(n)) || known(t + n);
@@ -316,7 +325,7 @@ fn greedy_chain(targets: &[u32], prefer_large: bool) -> (Vec<u32>, Vec<Product>)
     }
 }
 
-/// Exponents one product away, each once, in order.
+/// Exponents that are one product away, each once, in order.
 fn one_product_away(reached: &[u32]) -> BTreeMap<u32, Product> {
     let mut out = BTreeMap::new();
     for (left, a) in reached.iter().enumerate() {
@@ -347,10 +356,10 @@ mod tests {
     use super::*;
     use axisight_scalar::Lanes;
 
-    /// Orders and triples of the thesis, Table 8.1.
+    /// Orders of the thesis, Table 8.1.
     const TABLE: [u32; 8] = [2, 3, 10, 12, 18, 36, 48, 72];
 
-    /// Each product must lead to its exponent, and every target must be reached.
+    /// Each product gives its exponent, and every target is reached.
     #[test]
     fn chains_reach_their_targets() {
         let many: Vec<u32> = (1..60).map(|i| i * i % 499 + 1).collect();
@@ -378,12 +387,13 @@ mod tests {
         out[1]
     }
 
-    /// `n * 5e-16` is 3.6e-14 for 72; the reference adds the rounding of `n phi`, 2.5e-14.
+    /// The error is `n * 5e-16`, 3.6e-14 for 72. The rounding of `n phi` in the reference adds
+    /// 2.5e-14.
     #[test]
     fn powers_match_the_standard_library() {
         for order in TABLE {
             let n = f64::from(order);
-            // All orders are in the chain, one has an amplitude.
+            // All orders are in the chain, but only one has an amplitude.
             let one = |m: &u32| [f64::from(*m), 0.3, -0.7].map(|v| v * f64::from(*m == order));
             let mut constant: Vec<f64> = TABLE.iter().flat_map(one).collect();
             for (triple, m) in constant.chunks_exact_mut(3).zip(TABLE) {

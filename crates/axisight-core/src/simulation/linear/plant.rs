@@ -1,4 +1,4 @@
-//! What the linear loop needs to know of a robot, computed once.
+//! The linear plant: everything that the linear loop needs of a robot, computed once.
 
 use super::harmonics::{RippleTable, Waves};
 use super::propagator::Propagator;
@@ -9,25 +9,25 @@ use axisight_scalar::Scalar;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Why a robot has no linear plant.
+/// Reason why a robot has no linear plant.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LinearPlantError {
     /// The robot cannot be linearized.
     #[error(transparent)]
     Linearization(#[from] LinearizationError),
-    /// An effect that a straight line does not describe.
+    /// An effect has no linearization that holds in motion.
     #[error(
         "effect `{effect}`: expected one that is smooth about rest, got one without a \
          linearization that holds in motion; use the nonlinear plant"
     )]
     NotLinear {
-        /// Effect.
+        /// Name of the effect.
         effect: String,
     },
-    /// An axis angle that the linearization does not see as one state.
+    /// The motor angle of an axis is not proportional to a single state.
     #[error("axis {axis}: expected a motor angle in proportion to one state, got none")]
     NoMotorAngle {
-        /// Driven axis, from 1.
+        /// Driven axis, counted from 1.
         axis: usize,
     },
 }
@@ -35,13 +35,13 @@ pub enum LinearPlantError {
 /// One driven axis of a linear plant.
 #[derive(Debug, Clone)]
 pub(super) struct LinearAxis {
-    /// State the motor angle is proportional to.
+    /// State to which the motor angle is proportional.
     pub(super) slot: usize,
-    /// Motor angle per state [rad/rad].
+    /// Motor angle per unit of that state [rad/rad].
     pub(super) scale: f64,
     /// Motor angle at rest [rad].
     pub(super) angle: f64,
-    /// Torque the drive delivers at rest [Nm].
+    /// Torque that the drive delivers at rest [Nm].
     pub(super) torque: f64,
     /// Viscous friction added by effects, motor side [Nm s/rad].
     pub(super) viscous: f64,
@@ -54,7 +54,7 @@ pub(super) struct LinearAxis {
 #[derive(Debug, Clone)]
 pub struct LinearPlant {
     pub(super) linear: Linearization,
-    /// Driven joint angles it was linearized at [rad].
+    /// Driven joint angles at which it was linearized [rad].
     pub(super) start: Vec<f64>,
     /// State at rest, `[phi, q, phi', q']`.
     pub(super) rest: Vec<f64>,
@@ -62,18 +62,18 @@ pub struct LinearPlant {
     pub(super) axes: Vec<LinearAxis>,
     /// Torque and resolver ripple of all axes.
     pub(super) waves: Waves,
-    /// Propagation over one sample of the robot.
+    /// Propagation over one sample of the robot's sample time.
     pub(super) propagator: Propagator,
 }
 
 impl LinearPlant {
-    /// Linearize `robot` with `settings` at rest, driven joints at `start` [rad].
+    /// Linearize `robot` with `settings` at rest, with the driven joints at `start` [rad].
     ///
-    /// Effects at their neutral values are allowed whatever they are: they do nothing.
+    /// Any effect is allowed at its neutral value, where it has no influence.
     ///
     /// # Errors
-    /// [`LinearPlantError`] when an effect has no linearization (use the nonlinear plant),
-    /// or the plant cannot be built or does not settle.
+    /// [`LinearPlantError`] if an effect has no linearization (use the nonlinear plant), or if the
+    /// plant cannot be built or does not settle.
     pub fn new(
         robot: &RobotDescription,
         settings: &[EffectSetting<f64>],
@@ -104,7 +104,7 @@ impl LinearPlant {
         })
     }
 
-    /// The linearization in use; states `[phi, q, phi', q']`.
+    /// The linearization, with states `[phi, q, phi', q']`.
     pub fn linearization(&self) -> &Linearization {
         &self.linear
     }
@@ -114,7 +114,8 @@ impl LinearPlant {
         self.axes.len()
     }
 
-    /// Per axis, the state that carries its motor angle, and the motor angle per unit of it.
+    /// For each axis, the state that gives its motor angle, and the motor angle per unit of that
+    /// state.
     pub fn motor_slots(&self) -> Vec<(usize, f64)> {
         self.axes.iter().map(|a| (a.slot, a.scale)).collect()
     }
@@ -129,8 +130,7 @@ impl LinearPlant {
         self.rest.len()
     }
 
-    /// Multiplications and additions of one step of one run, by part; an `a * b + c` counts
-    /// once. For statements of efficiency.
+    /// Multiplications and additions of one step of one run, by part. An `a * b + c` counts once.
     pub fn operations(&self) -> Operations {
         Operations {
             propagation: self.propagator.operations(self.waves.act_on_torque()),
@@ -139,7 +139,7 @@ impl LinearPlant {
     }
 }
 
-/// Arithmetic operations of one step of one run; a fused multiply-add counts once.
+/// Arithmetic operations of one step of one run. A fused multiply-add counts once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Operations {
     /// Linear propagation and its correction for the ripple.
@@ -148,8 +148,8 @@ pub struct Operations {
     pub harmonics: usize,
 }
 
-/// Whether the linearization of the plant holds an effect; the waves of ripple and what is
-/// neutral stand beside it.
+/// Whether the linear plant can include an effect. Waves of ripple and neutral effects are handled
+/// separately.
 fn is_smooth(setting: &EffectSetting<f64>) -> Result<bool, LinearPlantError> {
     let misused = |e: EffectError| LinearizationError::from(PlantError::from(e));
     let info = effects::info(&setting.name).map_err(misused)?;
@@ -166,7 +166,7 @@ fn is_smooth(setting: &EffectSetting<f64>) -> Result<bool, LinearPlantError> {
     }
 }
 
-/// Ripple parameters by axis.
+/// Ripple parameters of each axis.
 fn ripple_tables(settings: &[EffectSetting<f64>], n_axes: usize) -> Vec<RippleTable> {
     let mut tables = vec![RippleTable::default(); n_axes];
     for setting in settings {

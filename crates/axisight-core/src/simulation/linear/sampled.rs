@@ -12,18 +12,19 @@ use axisight_scalar::Scalar;
 use std::borrow::Cow;
 use std::sync::atomic::Ordering;
 
-/// Simulate the linear plant until the longest lane ends; `observe` sees every sample.
+/// Simulate the linear plant until the longest lane ends; `observe` receives every sample.
 ///
-/// Everything but the ripple is exact for any sample time. The ripple has an error of order
-/// 4 in the step; `Method::RungeKutta4 { substeps }` divides the sample into that many
-/// steps, any other method takes one, which is good to about `(n phi' h)^4 / 400` of the
-/// amplitude of harmonic `n` at motor speed `phi'` and step `h`. `state` is the deviation
-/// added to the state at rest. `run.start` must be where `plant` was linearized.
+/// Everything but the ripple is exact for any sample time. The ripple has an error of order 4 in
+/// the step. The fixed-step methods divide the sample into `substeps` steps; any other method takes
+/// one step. The error is then about `(n phi' h)^4 / 400` of the amplitude of harmonic `n`, at
+/// motor speed `phi'` and step `h`.
+///
+/// `run.start` must be where `plant` was linearized.
 ///
 /// # Errors
-/// [`SimulationError`] for misuse; trouble during the run is a [`Status`]. Ripple too steep
-/// for its step is [`Status::StepSizeCollapsed`] at the first such sample; what was observed
-/// after it is void.
+/// [`SimulationError`] if the input is invalid. A failure during the run is a [`Status`]. Ripple
+/// that is too steep for its step gives [`Status::StepSizeCollapsed`] at the first such sample;
+/// later samples are not valid.
 #[inline(never)]
 pub fn simulate_linear<S: Scalar>(
     plant: &LinearPlant,
@@ -75,7 +76,8 @@ fn samples<S: Scalar>(
         if !state.settle() {
             return Status::Diverged(collapsed.unwrap_or(k));
         }
-        // An unstable loop also makes ripple steep: go on to see whether it is one.
+        // An unstable loop also makes the ripple steep. Continue, to see whether the loop is
+        // unstable.
         let steep = (0..S::LANES).any(|lane| state.coarse.lane(lane) > 0.0);
         if steep && collapsed.is_none() {
             collapsed = Some(k);
@@ -84,7 +86,8 @@ fn samples<S: Scalar>(
     collapsed.map_or(Status::Completed, Status::StepSizeCollapsed)
 }
 
-/// What effects on the path of commands change of a controller: where targets are late, all that they do.
+/// Changes of the controller by effects in the command path. They exist only if position references
+/// are delayed.
 fn own_laws<S: Scalar>(
     plant: &LinearPlant,
     run: &Run<'_>,
@@ -99,7 +102,7 @@ fn own_laws<S: Scalar>(
         .collect::<Result<_, _>>()?)
 }
 
-/// From command to delivered torque of every axis, settled at rest.
+/// The torque path of every axis, settled at rest.
 fn torque_paths<S: Scalar>(
     plant: &LinearPlant,
     run: &Run<'_>,
@@ -119,7 +122,7 @@ fn torque_paths<S: Scalar>(
     Ok(paths)
 }
 
-/// Everything that changes during a run.
+/// State of a run.
 struct LinearLoop<'a, S: Scalar> {
     plant: &'a LinearPlant,
     propagator: Cow<'a, Propagator>,
@@ -132,20 +135,21 @@ struct LinearLoop<'a, S: Scalar> {
     powers: Vec<[S; 2]>,
     /// Predicted motor angles [rad].
     angles: Vec<S>,
-    /// `[t_0, d_0, x]`: torque and its change over the step, deviation of the state; padded.
+    /// `[t_0, d_0, x]`, padded: the torque, its change over the step, and the deviation of the
+    /// state.
     input: Vec<S>,
     /// Predicted deviation at the end of the step, padded.
     predicted: Vec<S>,
-    /// `[e_1, e_2]`: what the prediction of the torque missed.
+    /// `[e_1, e_2]`, the error of the predicted torque.
     missed: Vec<S>,
-    /// `[phi, q, phi', q']`.
+    /// The absolute state `[phi, q, phi', q']`.
     absolute: Vec<S>,
-    /// One in lanes whose ripple is too steep for the step.
+    /// One in the lanes with ripple that is too steep for the step, otherwise zero.
     coarse: S,
 }
 
-/// Farthest that a correction may move the angle of the highest harmonic [rad]: the ripple
-/// is then moved to first order only. Steeper ripple needs more sub-steps.
+/// Largest angle [rad] by which a correction may move the highest harmonic, because the ripple is
+/// moved to first order only. Steeper ripple needs more sub-steps.
 const FARTHEST_MOVE: f64 = 0.1;
 
 impl<'a, S: Scalar> LinearLoop<'a, S> {
@@ -193,7 +197,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
         })
     }
 
-    /// Measure, command, and note what acts on the motors.
+    /// Measure, compute the commands, and note the torque disturbances of the motors.
     #[inline(always)]
     fn signals(&mut self, run: &Run<'_>, k: usize) {
         let (n, m) = (self.plant.n_states(), self.plant.n_axes());
@@ -212,7 +216,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
         }
     }
 
-    /// Advance the deviation by one sub-step under the torque `lines` of the axes.
+    /// Advance the deviation by one sub-step under the torques `lines` of the axes.
     #[inline(always)]
     fn step(&mut self, lines: &[Line<S>]) {
         let (n, m) = (self.plant.n_states(), self.plant.n_axes());
@@ -224,7 +228,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
             let change = ripple.slope * speed;
             self.input[i] = from - S::constant(axis.torque) + ripple.value;
             self.input[m + i] = to - from + change;
-            // Minus what a straight line predicts for the end of the step.
+            // Minus the prediction of the straight line for the end of the step.
             self.missed[i] = -(ripple.value + change);
             self.missed[m + i] = -change;
         }
@@ -267,8 +271,8 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
         self.propagator
             .correct
             .multiply(&self.missed, Some(&self.predicted), deviation);
-        // The true angle is a fourth-order distance from the predicted one: its square
-        // is far below the error of the method, so the evaluation serves both.
+        // The error of the predicted angle is of fourth order. Its square is far below the error of
+        // the method, so one evaluation serves both angles.
         for (i, axis) in self.plant.axes.iter().enumerate() {
             let by = (deviation[axis.slot] - self.predicted[axis.slot]) * axis.scale;
             self.ripple[i] = self.ripple[i].moved(by);
@@ -277,11 +281,11 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
         }
     }
 
-    /// Absolute state at the new sample; false if it is not finite.
+    /// Compute the absolute state at the new sample. Returns false if it is not finite.
     #[inline(always)]
     fn settle(&mut self) -> bool {
         let deviation = &self.input[2 * self.plant.n_axes()..];
-        // Infinity and NaN times zero are NaN, which stays.
+        // Infinity and NaN times zero are NaN, and the sum keeps a NaN.
         let mut trace = S::zero();
         for ((x, d), rest) in self
             .absolute

@@ -1,14 +1,15 @@
-//! Products of a small constant matrix with lanes of vectors.
+//! Products of a small constant matrix with vectors of lanes.
 
 use axisight_scalar::Scalar;
 use nalgebra::DMatrix;
 
-/// Rows computed together. Eight independent sums of two-register lanes cover the latency
-/// of a fused multiply-add, and fit the register file with the broadcast entries. (Registers
-/// of 512 bits did not pay: the chain of harmonics waits for latency, not for width.)
+/// Rows computed together. Eight independent sums of two-register lanes cover the latency of a
+/// fused multiply-add, and fit the register file with the broadcast entries.
+///
+/// Registers of 512 bits are not faster, because latency, not width, limits the chain of harmonics.
 const ROWS: usize = 4;
 
-/// A matrix in tiles of [`ROWS`] rows, each stored column by column; rows are padded
+/// A matrix in tiles of [`ROWS`] rows. Each tile is stored column by column, and rows are padded
 /// with zeros.
 #[derive(Debug, Clone)]
 pub(super) struct Tiles {
@@ -39,7 +40,8 @@ impl Tiles {
         self.data.len() * ROWS
     }
 
-    /// `out = base + M x`, `base` zero if none; `out` and `base` are padded.
+    /// Compute `out = base + M x`, with zero for a missing `base`. Both `out` and `base` are
+    /// padded.
     #[inline(always)]
     pub(super) fn multiply<S: Scalar>(&self, x: &[S], base: Option<&[S]>, out: &mut [S]) {
         let tiles = self.data.chunks_exact(self.columns);

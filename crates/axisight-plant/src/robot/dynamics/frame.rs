@@ -1,11 +1,11 @@
-//! Where a link is, joint after joint from the base.
+//! Poses of the links, from joint to joint outwards.
 
 use super::super::vector::{Mat3, Vec3, rotate_inertia, rotation};
 use super::{Moments, Screw};
 use axisight_scalar::Scalar;
 use std::array::from_fn;
 
-/// Where a link is.
+/// Pose of a link.
 pub(super) struct Frame<S> {
     columns: [Vec3<S>; 3],
     pub(super) position: Vec3<S>,
@@ -25,7 +25,7 @@ impl<S: Scalar> Frame<S> {
         }
     }
 
-    /// Turn about column `K`; `screw` becomes the axis.
+    /// Rotate about column `K`, and write the joint axis to `screw`.
     #[inline(always)]
     pub(super) fn turn<const K: usize>(
         &mut self,
@@ -63,7 +63,7 @@ impl<S: Scalar> Frame<S> {
         screw.linear = axis;
     }
 
-    /// The vector with constant components in this frame; zero components cost nothing.
+    /// The vector with these constant components in this frame. Zero components cost nothing.
     #[inline(always)]
     pub(super) fn apply_constant(&self, v: &[f64; 3]) -> Vec3<S> {
         let mut out = Vec3::zero();

@@ -27,7 +27,8 @@ impl JacobianPlant {
         }
     }
 
-    /// `df/dx` at state `x`, and `df/ds` for delivered torques that change by `rise` per unit `s`.
+    /// Compute `df/dx` at state `x`, and `df/ds` for delivered torques that change by `rise` per
+    /// unit of `s`.
     pub(super) fn evaluate(
         &mut self,
         x: &[f64],
@@ -41,7 +42,7 @@ impl JacobianPlant {
         for (c, u) in self.command.iter_mut().zip(command) {
             *c = D::constant(*u);
         }
-        // One more seed than states: the torque along the step.
+        // One more seed than states, for the change of the torque over the step.
         for first in (0..=n).step_by(WIDTH) {
             for (i, (seeded, x)) in self.x.iter_mut().zip(x).enumerate() {
                 *seeded = D::constant(*x);

@@ -1,8 +1,8 @@
-//! `(shift I - J) x = b`, factorized once and solved often.
+//! `(shift I - J) x = b`, factorized once and solved for many right-hand sides.
 
 use nalgebra::{ComplexField, DMatrix, DVector, Dyn, LU};
 
-/// Factorized `shift I - J`; `None` if singular to working precision.
+/// A factorized `shift I - J`.
 pub(super) struct Shifted<T: ComplexField>(LU<T, Dyn, Dyn>);
 
 impl<T: ComplexField<RealField = f64>> Shifted<T> {

@@ -14,9 +14,9 @@ use nalgebra::DMatrix;
 use radau_iia::RadauIia;
 use rosenbrock::Rosenbrock;
 
-/// What an integrator needs of an implicit solver.
+/// Interface between an integrator and an implicit solver.
 pub(super) trait Implicit<S: Scalar>: Send {
-    /// Advance `x` over a sample; false if the error bound cannot be met.
+    /// Advance `x` over a sample. Returns false if the error bound cannot be met.
     fn advance(
         &mut self,
         method: Method,
@@ -28,11 +28,11 @@ pub(super) trait Implicit<S: Scalar>: Send {
 }
 
 impl<S: Scalar> Stepper<S> {
-    /// Scratch for `plant` and any method: `plain` and `seeded` are the same plant over plain
-    /// and over dual numbers.
+    /// A stepper for `plant` and any method; `plain` and `seeded` are the same plant over plain and
+    /// over dual numbers.
     ///
-    /// Implicit methods take one run at a time and carry no derivatives: for scalars that do
-    /// otherwise, [`Stepper::new`] is what there is.
+    /// Implicit methods integrate one run without derivatives. For all other scalars, use
+    /// [`Stepper::new`].
     pub fn with_jacobian(plant: &Plant<S>, plain: Plant<f64>, seeded: Plant<Seeded>) -> Self {
         let mut stepper = Self::new(plant);
         if S::LANES == 1 && S::PARTIALS == 0 {
@@ -60,7 +60,8 @@ impl Slopes {
         }
     }
 
-    /// `df/dx` at the start of the step, and the change of `f` with the torque over the step.
+    /// Compute `df/dx` at the start of the step, and the change of `f` due to the torque over the
+    /// step.
     fn jacobian_at(
         &mut self,
         step: &Step<'_>,
@@ -74,7 +75,7 @@ impl Slopes {
             .evaluate(x, &start, &rise, step.command, jacobian, along);
     }
 
-    /// `dx = f(x)` at fraction `at` of the step.
+    /// Compute `dx = f(x)` at the fraction `at` of the step.
     fn evaluate(&mut self, step: &Step<'_>, at: f64, x: &[f64], dx: &mut [f64]) {
         for (a, line) in self.applied.iter_mut().zip(step.lines) {
             *a = line.at(at);
@@ -84,31 +85,31 @@ impl Slopes {
     }
 }
 
-/// A step to try: its length [s], the command of the sample and the torque over the step.
+/// A step to try: the length [s], the command of the sample and the torque over the step.
 struct Step<'a> {
     command: &'a [f64],
     length: f64,
     lines: &'a [Line<f64>],
     /// Bound on the local error, relative to each state.
     tolerance: f64,
-    /// Bound on what an inner iteration leaves of it.
+    /// Bound on the remaining error of an inner iteration, relative to each state.
     iteration_tolerance: f64,
 }
 
 /// Share of the tolerance that an inner iteration may leave.
 const ITERATION_SHARE: f64 = 1e-2;
-/// What no iteration gets below, relative to the state.
+/// Smallest achievable error of an iteration, relative to the state.
 const ROUNDING: f64 = 1e-13;
-/// Steps and attempts in one sample before a run is given up.
+/// Largest number of steps and attempts in one sample.
 const MOST_STEPS: u64 = 20_000;
-/// Shortest step as a share of the sample; a reversal of stiff bristles takes 1e-6 of it.
+/// Shortest step as a share of the sample. A reversal of stiff bristles needs 1e-6.
 const SHORTEST: f64 = 1e-12;
 
-/// What became of a step.
+/// Result of a step.
 enum Trial {
-    /// Local error in units of the tolerance; at most one means accepted.
+    /// Local error in units of the tolerance. The step is accepted if it is at most one.
     Error(f64),
-    /// The inner iteration failed: a shorter step, or a new Jacobian, is needed.
+    /// The inner iteration failed. A shorter step or a new Jacobian is needed.
     NoConvergence,
 }
 
@@ -116,7 +117,7 @@ enum Trial {
 trait OneStep {
     /// Order of the error estimate plus one: the step grows with `error^(-1/order)`.
     const ORDER: f64;
-    /// Try a step from `x`, which is replaced if the error is at most one.
+    /// Try a step from `x`. Replaces `x` if the error is at most one.
     fn attempt(
         &mut self,
         step: &Step<'_>,
@@ -124,9 +125,9 @@ trait OneStep {
         x: &mut [f64],
         effort: &mut Effort,
     ) -> Trial;
-    /// Forget the Jacobian.
+    /// Discard the Jacobian.
     fn refresh(&mut self);
-    /// Whether the Jacobian was made at the present state.
+    /// Whether the Jacobian belongs to the present state.
     fn is_fresh(&self) -> bool;
 }
 
@@ -137,7 +138,7 @@ struct Solver {
     steps: StepSize,
 }
 
-/// What the choice of steps needs from sample to sample.
+/// Step-size control that persists from sample to sample.
 struct StepSize {
     /// Proposed step as a share of the sample.
     fraction: f64,
@@ -231,7 +232,7 @@ impl StepSize {
                     effort.steps += 1;
                     torque.accept();
                     let grown = 0.9 * error.max(1e-9).powf(-1.0 / M::ORDER);
-                    // Small changes are not worth a factorization.
+                    // A small change of the step is not worth a factorization.
                     if grown > 1.5 {
                         self.fraction = ((to - from) * grown.min(5.0)).min(1.0);
                     }
@@ -240,7 +241,7 @@ impl StepSize {
                 Trial::Error(error) => {
                     effort.rejections += 1;
                     let wanted = 0.9 * error.powf(-1.0 / M::ORDER);
-                    // An error that is not a number shrinks the step most.
+                    // An error of NaN shrinks the step most.
                     let shrunk = if wanted > 0.1 { wanted.min(0.8) } else { 0.1 };
                     self.fraction = (to - from) * shrunk;
                     method.refresh();
@@ -261,8 +262,8 @@ impl StepSize {
         true
     }
 
-    /// End of the step that starts at `from`. What is left of the sample is cut in equal
-    /// parts: a short last step would need a factorization of its own.
+    /// End of the step that starts at `from`. The rest of the sample is cut in equal parts, because
+    /// a short last step would need its own factorization.
     fn end(&self, from: f64) -> f64 {
         let parts = ((1.0 - from) / self.fraction).ceil();
         if parts <= 1.0 {
@@ -280,7 +281,7 @@ mod tests {
     use crate::robot::{Compliance, Controller, Drive, Joint, Link, Motion, RobotDescription};
     use crate::simulation::{TorqueBuffers, TorquePath};
 
-    /// A loaded gear, fastest mode 70 Hz, and a swaying link behind it.
+    /// A loaded gear with its fastest mode at 70 Hz, and a swinging link behind it.
     fn robot() -> RobotDescription {
         let joint = |name: &str, stiffness, drive, mass| Joint {
             name: name.to_owned(),
@@ -358,7 +359,7 @@ mod tests {
     }
 
     fn observed_order<M: OneStep>(make: impl Fn(usize) -> M) -> f64 {
-        // The reference is this method's own limit.
+        // The reference is the limit of the same method.
         let exact = fall(&make, 320);
         let error = |n: usize| {
             let x = fall(&make, n);
@@ -368,8 +369,8 @@ mod tests {
         (error(20) / error(40)).log2()
     }
 
-    /// The step is 1 ms and 0.5 ms against a fastest mode of 70 Hz: the next error term is
-    /// smaller by about w h = 0.2 to 0.4, which may move the order by as much.
+    /// With steps of 1 ms and 0.5 ms and a mode of 70 Hz, the next error term is smaller by about w
+    /// h = 0.2 to 0.4, and may change the order by as much.
     #[test]
     fn observed_orders() {
         let radau = observed_order(RadauIia::new);

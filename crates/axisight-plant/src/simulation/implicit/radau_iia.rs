@@ -70,7 +70,7 @@ pub(super) struct RadauIia {
     jacobian: Option<DMatrix<f64>>,
     fresh: bool,
     factors: Option<Factors>,
-    /// Departures of the stages from the start of the step, and their mode coordinates.
+    /// Changes of the stages from the start of the step, and their mode coordinates.
     stages: [Vec<f64>; 3],
     modes: [Vec<f64>; 3],
     slopes: [Vec<f64>; 3],
@@ -107,7 +107,7 @@ impl RadauIia {
             jacobian
         });
         let known = self.factors.as_ref().map(|f| f.length);
-        // Equal lengths of consecutive steps differ by rounding of the sample fractions.
+        // Equal lengths of consecutive steps differ by the rounding of the sample fractions.
         if known.is_none_or(|length| (length / step.length - 1.0).abs() > 1e-9) {
             let rate = 1.0 / step.length;
             self.factors = Some(Factors {
@@ -119,7 +119,7 @@ impl RadauIia {
         }
     }
 
-    /// Simplified Newton iteration; true once the stages are solved for.
+    /// Simplified Newton iteration. Returns true if it converges.
     fn iterate(
         &mut self,
         step: &Step<'_>,
@@ -145,8 +145,9 @@ impl RadauIia {
             if !change.is_finite() {
                 return false;
             }
-            // The rate is this step's own: behind a corner of the plant the last step's says
-            // nothing, and one iteration with the old Jacobian may be far off.
+            // Estimate the rate from this step alone: after a corner of the plant, the rate of the
+            // last step is meaningless, and one iteration with the old Jacobian may have a large
+            // error.
             if let Some(last) = last {
                 let rate = change / last;
                 if rate >= 1.0 {
@@ -156,7 +157,7 @@ impl RadauIia {
                 if remains <= 1.0 {
                     return true;
                 }
-                // Hopeless within the iterations that are left.
+                // The iterations that are left cannot reach the tolerance.
                 let left = i32::try_from(MOST_ITERATIONS - 1 - iteration).unwrap_or(0);
                 if remains * rate.powi(left) > 1.0 {
                     return false;
@@ -170,7 +171,7 @@ impl RadauIia {
         false
     }
 
-    /// One Newton update; returns its size in units of the iteration's tolerance.
+    /// One Newton update. Returns its size in units of the iteration's tolerance.
     fn newton_step(&mut self, step: &Step<'_>, x: &[f64]) -> Option<f64> {
         let factors = self.factors.as_ref()?;
         let rate = 1.0 / step.length;
@@ -210,8 +211,8 @@ impl RadauIia {
         Some(size)
     }
 
-    /// Local error in units of the tolerance, filtered through the real system so that it stays
-    /// bounded for stiff parts.
+    /// Local error in units of the tolerance. A filter with the real system keeps it bounded for
+    /// stiff parts.
     fn error(
         &mut self,
         step: &Step<'_>,
@@ -228,7 +229,8 @@ impl RadauIia {
         let mut error = f64::INFINITY;
         for again in [false, true] {
             if again {
-                // The first estimate is pessimistic for stiff parts; look from where it points.
+                // The first estimate is pessimistic for stiff parts, so estimate again at the
+                // corrected state.
                 for i in 0..self.n {
                     self.probe[i] = x[i] + self.real[i];
                 }

@@ -1,8 +1,8 @@
 //! Rosenbrock method RODAS of order 4(3) with six stages (Hairer, Wanner 1996, *Solving
 //! Ordinary Differential Equations II*, section IV.7), L-stable and stiffly accurate.
 //!
-//! One factorization and six solves a step and no iteration, with the Jacobian made anew
-//! for every step, as the order asks for: cheap where a few digits will do.
+//! A step takes one factorization, six solves and no iteration. The order requires a new Jacobian
+//! for every step. The method is cheap if a few digits suffice.
 
 use super::linear::Shifted;
 use super::{OneStep, Slopes, Step, Trial};
@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 const STAGES: usize = 6;
 const GAMMA: f64 = 0.25;
 const NODE: [f64; STAGES] = [0.0, 0.386, 0.21, 0.63, 1.0, 1.0];
-/// Weights of the torque's change over the step.
+/// Weights of the change of the torque over the step.
 const DRIFT: [f64; STAGES] = [0.25, -0.1043, 0.1035, -0.03620000000000023, 0.0, 0.0];
 const FORWARD: [[f64; 5]; STAGES] = [
     [0.0; 5],
@@ -74,7 +74,7 @@ pub(super) struct Rosenbrock {
     increments: [DVector<f64>; STAGES],
     probe: Vec<f64>,
     slope: Vec<f64>,
-    /// The Jacobian belongs to the present state.
+    /// Whether the Jacobian belongs to the present state.
     fresh: bool,
 }
 
@@ -90,7 +90,7 @@ impl Rosenbrock {
         }
     }
 
-    /// `x + sum_j FORWARD[stage][j] u_j` into the probe.
+    /// Write `x + sum_j FORWARD[stage][j] u_j` to the probe.
     fn look_ahead(&mut self, x: &[f64], stage: usize) {
         self.probe.copy_from_slice(x);
         for (weight, u) in FORWARD[stage].iter().zip(&self.increments).take(stage) {
@@ -111,7 +111,7 @@ impl OneStep for Rosenbrock {
         x: &mut [f64],
         effort: &mut Effort,
     ) -> Trial {
-        // The change of the torque depends on the step, so this is needed for each.
+        // The change of the torque differs from step to step, so compute it each time.
         slopes.jacobian_at(step, x, &mut self.jacobian, &mut self.drift);
         effort.jacobians += 1;
         effort.factorizations += 1;
@@ -138,7 +138,7 @@ impl OneStep for Rosenbrock {
                 return Trial::NoConvergence;
             }
         }
-        // The last increment is the error and the last correction at once.
+        // The last increment is both the error estimate and the last correction.
         self.look_ahead(x, STAGES - 1);
         let last = &self.increments[STAGES - 1];
         for (p, u) in self.probe.iter_mut().zip(last.iter()) {

@@ -8,22 +8,23 @@ use nalgebra::Complex;
 
 /// Settings of the clipping algorithm.
 ///
-/// In iteration `i` of `n` the signal is clipped at `level` times its peak, where `1 - level`
-/// falls geometrically from `1 - first_level` to `1 - last_level`, transformed, and given
-/// its amplitudes back. What is cut off is subtracted `relaxation` times: one is the
-/// algorithm as published; over-relaxation gets as low in a fraction of the iterations.
+/// Iteration `i` of `n` clips the signal at `level` times its peak, transforms it, and restores its
+/// amplitudes. `1 - level` falls geometrically from `1 - first_level` to `1 - last_level`.
+///
+/// The clipped part is subtracted `relaxation` times. The published algorithm has a factor of one;
+/// a larger factor reaches the same crest factor in fewer iterations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clipping {
     /// Number of iterations.
     pub iterations: usize,
     /// Level at the beginning, relative to the peak.
     pub first_level: f64,
-    /// Level at the end.
+    /// Level at the end, relative to the peak.
     pub last_level: f64,
-    /// How many times the clipped part is subtracted.
+    /// Factor by which the clipped part is subtracted.
     pub relaxation: f64,
-    /// Grid, in multiples of the Nyquist count of the highest line; rounded up to a power
-    /// of two. Below 8 peaks hide between samples.
+    /// Samples of the grid, in multiples of the Nyquist count of the highest line, rounded up to a
+    /// power of two. Below 8, the grid misses peaks between samples.
     pub oversampling: usize,
 }
 
@@ -49,7 +50,7 @@ impl Clipping {
         if let Some((field, level)) = levels.into_iter().find(|(_, level)| !fraction(*level)) {
             return Err(ExcitationError::new(field, "between 0 and 1", level));
         }
-        // Past 100 the steps are noise.
+        // Steps with a factor above 100 are noise.
         if !(self.relaxation > 0.0 && self.relaxation <= 100.0) {
             let expected = "above 0, up to 100";
             return Err(ExcitationError::new(
@@ -62,12 +63,12 @@ impl Clipping {
     }
 }
 
-/// The algorithm made ready for one problem; shared between threads.
+/// The algorithm, prepared for one problem and shared between threads.
 pub(super) struct Clipper<'a> {
     problem: &'a CrestProblem,
     settings: Clipping,
-    // Phases need four digits while peaks are traded against each other; single precision
-    // has seven and moves half the memory.
+    // Phases need four digits while peaks are traded against each other. Single precision has seven
+    // digits and halves the memory traffic.
     transform: LineTransform<f32>,
     amplitude: Vec<f32>,
 }
@@ -83,10 +84,10 @@ impl<'a> Clipper<'a> {
         }
     }
 
-    /// Improve `coefficient` until the iterations are done or `stop` says so; returns how
-    /// many were done.
+    /// Improve `coefficient` until all iterations are done or `stop` returns true; returns the
+    /// number of iterations.
     pub fn run(&self, coefficient: &mut [Complex<f64>], stop: impl Fn() -> bool) -> usize {
-        /// Iterations between looks at the clock.
+        /// Number of iterations between two calls of `stop`.
         const WATCH: usize = 64;
         let Clipping {
             iterations,

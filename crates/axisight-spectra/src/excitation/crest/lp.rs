@@ -1,18 +1,21 @@
-//! Refinement in the L2p norm with growing p; Guillaume, Schoukens, Pintelon and Kollar
-//! (1991), "Crest-factor minimization using nonlinear Chebyshev approximation methods".
+//! Refinement of the phases in the L2p norm with growing p.
 //!
-//! A line `Re(d exp(i theta_n))` changes by `Re(b exp(i theta_n))` per unit of a parameter:
-//! `b = i d` for its phase, `b = 1` and `b = i` for the two parts of a line of snow. The
-//! normal matrix of the Gauss-Newton method on the residuals `x_n^p` then needs the
-//! transform of the weights `w_n = x_n^(2p-2)` only,
+//! The method is that of Guillaume, Schoukens, Pintelon and Kollar (1991), "Crest-factor
+//! minimization using nonlinear Chebyshev approximation methods".
+//!
+//! A line `Re(d exp(i theta_n))` changes by `Re(b exp(i theta_n))` per unit of a parameter.
+//! `b = i d` is its phase; `b = 1` and `b = i` are the two parts of a snow line. The normal matrix
+//! of the Gauss-Newton method for the residuals `x_n^p` then needs only the transform of the
+//! weights `w_n = x_n^(2p-2)`,
 //!
 //! `sum_n w_n Re(b_j e^(i theta_j)) Re(b_k e^(i theta_k))
-//!    = 1/2 Re(b_j b_k W(j+k) + b_j conj(b_k) W(j-k))`,  `W(m) = sum_n w_n e^(2 pi i m n/N)`,
+//!    = 1/2 Re(b_j b_k W(j+k) + b_j conj(b_k) W(j-k))`,  `W(m) = sum_n w_n e^(2 pi i m n/N)`.
 //!
-//! one transform instead of a product of matrices as long as the grid.
+//! One transform replaces a product of matrices as long as the grid.
 //!
-//! The loop is that of all fits; the descent is its own: phases turn, amplitudes are set right
-//! after every step, and the matrix, some thousand rows, is damped by the mean of its diagonal.
+//! The loop is `axisight_numerics::descent::search`, as for all fits, with a special
+//! descent: phases turn, and every step is followed by a correction of the amplitudes. The matrix
+//! has some thousand rows and is damped by the mean of its diagonal.
 
 use super::{CrestProblem, check_oversampling};
 use crate::excitation::ExcitationError;
@@ -25,12 +28,12 @@ use nalgebra::{Complex, DMatrix};
 pub struct LpRefinement {
     /// First exponent 2p.
     pub first_exponent: u32,
-    /// Last exponent 2p; it doubles in between.
+    /// Last exponent 2p. The exponent doubles from the first to the last.
     pub last_exponent: u32,
-    /// Steps tried at each exponent, at most.
+    /// Largest number of steps tried at each exponent.
     pub iterations: usize,
-    /// Grid, in multiples of the Nyquist count of the highest line; rounded up to a power
-    /// of two.
+    /// Samples of the grid, in multiples of the Nyquist count of the highest line, rounded up to a
+    /// power of two.
     pub oversampling: usize,
 }
 
@@ -47,7 +50,7 @@ impl Default for LpRefinement {
 
 impl LpRefinement {
     pub(super) fn check(&self) -> Result<(), ExcitationError> {
-        /// Powers this high are zero but at the peak itself.
+        /// At higher powers all samples but the peak itself vanish.
         const HIGHEST: u32 = 1 << 16;
         let (first, last) = (self.first_exponent, self.last_exponent);
         if first < 4 || first % 2 == 1 || last < first || last > HIGHEST {
@@ -59,7 +62,7 @@ impl LpRefinement {
     }
 }
 
-/// One parameter: the position of its line, and which part of it.
+/// One parameter: a part of the line at this position.
 #[derive(Clone, Copy)]
 enum Part {
     Phase(usize),
@@ -67,18 +70,18 @@ enum Part {
     Imaginary(usize),
 }
 
-/// The method made ready for one problem; shared between threads.
+/// The method, prepared for one problem and shared between threads.
 pub(super) struct Refiner<'a> {
     problem: &'a CrestProblem,
     settings: LpRefinement,
     parts: Vec<Part>,
     signal: LineTransform<f64>,
-    /// Lines 0 to twice the highest.
+    /// Transform of the lines 0 to twice the highest line.
     weights: LineTransform<f64>,
 }
 
-/// Steps at one exponent after the other: the present point in `coefficient` and `grid`, the
-/// trial in `next` and `spare`.
+/// The search at one exponent after the other. `coefficient` and `grid` hold the present point,
+/// `next` and `spare` the trial.
 struct Level<'a, 'b, F> {
     refiner: &'a Refiner<'b>,
     stop: F,
@@ -88,25 +91,25 @@ struct Level<'a, 'b, F> {
     spare: LineGrid<f64>,
     gradient: Vec<Complex<f64>>,
     weight: Vec<Complex<f64>>,
-    /// Normal matrix at the present point, once it was asked for.
+    /// Normal matrix at the present point, computed on demand.
     matrix: Option<DMatrix<f64>>,
     p: u32,
     /// Norm at the present point.
     norm: f64,
-    /// Norm at the trial, where it is finite.
+    /// Norm at the trial, if it is finite.
     trial: Option<f64>,
     /// Steps tried at this exponent.
     tried: usize,
-    /// Damping last asked for.
+    /// Damping of the last step.
     damping: f64,
 }
 
-/// No more steps at this exponent, or none at all.
+/// The reason to end the search: no more steps at this exponent, or at all.
 struct Enough;
 
 impl<'a> Refiner<'a> {
     pub fn new(problem: &'a CrestProblem, settings: LpRefinement) -> Self {
-        // Sums of two lines do not wrap around on this grid.
+        // On this grid, the sum of two lines does not alias.
         let half = problem.half_grid(settings.oversampling);
         let high = problem.lines.iter().copied().max().unwrap_or(0);
         let mut parts: Vec<Part> = (0..problem.wanted()).map(Part::Phase).collect();
@@ -122,9 +125,10 @@ impl<'a> Refiner<'a> {
         }
     }
 
-    /// Improve `coefficient`; returns the number of steps tried.
+    /// Improve `coefficient` until all exponents are done or `stop` returns true; returns the
+    /// number of steps tried.
     pub fn run(&self, coefficient: &mut [Complex<f64>], stop: impl Fn() -> bool) -> usize {
-        /// A step that gains less than this share of the norm ends the level.
+        /// A reduction below this share of the norm ends the level.
         const WORTHWHILE: f64 = 2e-5;
         let zero = Complex::default();
         let mut level = Level {
@@ -194,7 +198,7 @@ impl<F: Fn() -> bool> Level<'_, '_, F> {
         self.norm = lp_norm(&self.grid, p);
     }
 
-    /// Lower half of the normal matrix; leaves the gradient's transform behind.
+    /// Lower half of the normal matrix. Also leaves the transform for the gradient in `self`.
     fn normal_matrix(&mut self) -> DMatrix<f64> {
         let p = self.p;
         let scale = 1.0 / self.grid.peak();
@@ -211,7 +215,7 @@ impl<F: Fn() -> bool> Level<'_, '_, F> {
             let k = lines[*at];
             for (row, (at, first)) in b.iter().enumerate().skip(column) {
                 let j = lines[*at];
-                // The transform of the weights holds conj(W).
+                // The transform of the weights is conj(W).
                 let sum = self.weight[j + k].conj();
                 let difference = if j >= k {
                     self.weight[j - k].conj()
@@ -225,7 +229,7 @@ impl<F: Fn() -> bool> Level<'_, '_, F> {
         matrix
     }
 
-    /// Changes of all parameters by the damped step.
+    /// Changes of all parameters by the damped Gauss-Newton step.
     fn change(&self, matrix: &DMatrix<f64>, damping: f64) -> Option<Vec<f64>> {
         let n = matrix.nrows();
         let mean = (0..n).map(|i| matrix[(i, i)]).sum::<f64>() / n as f64;

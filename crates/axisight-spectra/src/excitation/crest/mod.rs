@@ -1,10 +1,11 @@
 //! Phases of a multisine that make its crest factor small.
 //!
-//! The crest factor is the peak over the *effective* rms, the rms of the wanted lines only
-//! (Wernholt 2004, section 5.4): power in extra lines ("snow") counts for nothing. The peak
-//! is always that of a grid of at least [`FINE_GRID`] times the Nyquist count of the highest
-//! line. There a peak between two samples is missed by `1 - cos(pi / 64)` = 0.12 % at most;
-//! a parabola through three samples leaves less than 1e-5 of that.
+//! The crest factor is the peak divided by the *effective* rms, the rms of the wanted lines only
+//! (Wernholt 2004, section 5.4). Power in extra lines ("snow") does not count.
+//!
+//! The peak is taken on a grid of at least [`FINE_GRID`] times the Nyquist count of the highest
+//! line. There the error of a peak between two samples is at most `1 - cos(pi / 64)` = 0.12 %. A
+//! parabola through three samples leaves less than 1e-5 of this error.
 
 mod clipping;
 mod lp;
@@ -21,31 +22,34 @@ use nalgebra::Complex;
 /// Samples of the grid for peaks, in multiples of twice the highest line.
 pub const FINE_GRID: usize = 32;
 
-/// Which lines, how much of each, and which lines may be added.
+/// The wanted lines with their amplitudes, and the lines that may be added.
 #[derive(Debug, Clone)]
 pub struct CrestProblem {
-    /// Wanted lines, then snow.
+    /// Wanted lines, then snow lines.
     lines: Vec<usize>,
-    /// Amplitudes of the wanted lines, largest about one.
+    /// Amplitudes of the wanted lines, scaled so that the largest is about one.
     amplitude: Vec<f64>,
-    /// Largest amplitude of a line of snow.
+    /// Largest amplitude of a snow line.
     snow_limit: f64,
 }
 
 impl CrestProblem {
-    /// Lines `k` (multiples of one over the period) with their amplitudes, and lines of snow
-    /// with amplitudes up to `snow_limit` times the root mean square of the others.
+    /// A problem with wanted `lines` (multiples of one over the period), their amplitudes, and snow
+    /// lines.
+    ///
+    /// The amplitude of a snow line is at most `snow_limit` times the root mean square of the
+    /// wanted amplitudes.
     ///
     /// # Errors
-    /// [`ExcitationError`] for no lines, a line that is zero or comes twice, amplitudes that
-    /// are not positive, and a limit below zero.
+    /// [`ExcitationError`] if there are no lines, a line is zero or comes twice, an amplitude is
+    /// not positive, or the limit is negative.
     pub fn new(
         lines: &[usize],
         amplitude: &[f64],
         snow: &[usize],
         snow_limit: f64,
     ) -> Result<Self, ExcitationError> {
-        /// A grid of 2^31 samples is past what anybody can wait for.
+        /// A grid of 2^31 samples would take too long.
         const MOST: usize = 1 << 24;
         if lines.is_empty() || lines.len() != amplitude.len() {
             let expected = format!("{} numbers, one per line, at least one", lines.len());
@@ -91,19 +95,19 @@ impl CrestProblem {
         self.amplitude.len()
     }
 
-    /// Effective rms, in the scale of the coefficients.
+    /// Effective rms, in the units of the coefficients.
     fn rms(&self) -> f64 {
         (0.5 * self.wanted() as f64).sqrt()
     }
 
-    /// Pairs of samples of a grid of `oversampling` times the Nyquist count, made a power of
-    /// two.
+    /// Pairs of samples of a grid of `oversampling` times the Nyquist count, rounded up to a power
+    /// of two.
     fn half_grid(&self, oversampling: usize) -> usize {
         let high = self.lines.iter().copied().max().unwrap_or(1);
         (oversampling * high).next_power_of_two()
     }
 
-    /// Coefficients with the given phases of the wanted lines and no snow.
+    /// Coefficients with the given phases of the wanted lines, without snow.
     fn start(&self, phases: &[f64]) -> Vec<Complex<f64>> {
         let wanted = self.amplitude.iter().zip(phases);
         let mut d: Vec<_> = wanted.map(|(a, p)| sine(*a, *p)).collect();
@@ -111,7 +115,7 @@ impl CrestProblem {
         d
     }
 
-    /// Amplitudes set right, phases kept.
+    /// Restore the amplitudes and keep the phases.
     fn project(&self, coefficient: &mut [Complex<f64>]) {
         for (i, d) in coefficient.iter_mut().enumerate() {
             let size = d.norm();
@@ -133,7 +137,7 @@ pub struct FineGrid {
 }
 
 impl FineGrid {
-    /// For the coefficients of `problem`.
+    /// A grid for the coefficients of `problem`.
     pub fn new(problem: &CrestProblem) -> Self {
         let transform = LineTransform::new(problem.half_grid(FINE_GRID), &problem.lines);
         Self {
@@ -143,7 +147,7 @@ impl FineGrid {
         }
     }
 
-    /// Crest factor.
+    /// Crest factor of the signal with these coefficients.
     pub fn crest_factor(&mut self, coefficient: &[Complex<f64>]) -> f64 {
         self.transform.synthesize(coefficient, &mut self.grid);
         let highest = self.grid.peak();
@@ -158,7 +162,7 @@ impl FineGrid {
             }
         };
         let mut peak = highest;
-        // Lower samples cannot grow past the highest by what lies between them.
+        // Between samples, a lower sample cannot rise above the highest one.
         for i in (n..2 * n).filter(|i| sample(*i).abs() > 0.998 * highest) {
             let sign = sample(i).signum();
             let [before, here, after] = [i - 1, i, i + 1].map(|i| sign * sample(i));
@@ -183,20 +187,20 @@ pub fn peak(lines: &[usize], amplitude: &[f64], phase: &[f64]) -> Result<f64, Ex
 }
 
 fn check_oversampling(field: &'static str, value: usize) -> Result<(), ExcitationError> {
-    // From 4 on, sums of two lines stay below the Nyquist line of the grid.
+    // From 4 on, the sum of two lines stays below the Nyquist line of the grid.
     if (4..=64).contains(&value) {
         return Ok(());
     }
     Err(ExcitationError::new(field, "4 to 64", value))
 }
 
-/// `a sin(x + phase)` as the real part of `d exp(i x)`.
+/// `a sin(x + phase)` as the real part of `d exp(i x)`; returns `d`.
 fn sine(amplitude: f64, phase: f64) -> Complex<f64> {
     let (sin, cos) = phase.sin_cos();
     Complex::new(amplitude * sin, -amplitude * cos)
 }
 
-/// Amplitude and phase of [`sine`].
+/// Amplitude and phase of a coefficient, the inverse of [`sine`].
 fn polar(d: Complex<f64>) -> (f64, f64) {
     (d.norm(), d.re.atan2(-d.im))
 }

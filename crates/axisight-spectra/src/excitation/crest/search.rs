@@ -1,4 +1,4 @@
-//! Many starts in parallel, the best kept.
+//! Crest-factor search from many starts in parallel, which keeps the best result.
 
 use super::clipping::Clipper;
 use super::lp::Refiner;
@@ -9,50 +9,50 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Unknowns above which the refinement's dense normal matrices, one for each thread, pass a
-/// quarter of a gigabyte.
+/// Largest number of unknowns for a refinement. Above it, the dense normal matrices of each thread
+/// need more than a quarter of a gigabyte.
 const MOST_REFINED: usize = 4096;
 
-/// Where a search starts from.
+/// Start of a search.
 #[derive(Debug, Clone)]
 pub enum Start {
-    /// Random phases as a function of (seed, number of the start).
+    /// Random phases, a function of (seed, number of the start).
     Random(u64),
-    /// These phases of the wanted lines; one start.
+    /// One start from these phases of the wanted lines [rad].
     Given(Vec<f64>),
 }
 
-/// How long a search goes on.
+/// Limits of a search.
 #[derive(Debug, Clone, Copy)]
 pub struct Budget {
-    /// Number of starts; with no time limit the result depends on nothing else.
+    /// Number of starts. Without a time limit, the result depends on nothing else.
     pub starts: u64,
-    /// Wall time after which starts are cut short and none is begun.
+    /// Wall time after which no start begins and running starts stop early.
     pub time: Option<Duration>,
-    /// Threads; 0 takes every processor.
+    /// Number of threads; 0 takes every processor.
     pub threads: usize,
 }
 
-/// The best of a search.
+/// Best result of a search.
 #[derive(Debug, Clone)]
 pub struct Found {
-    /// Number of the start.
+    /// Number of the best start.
     pub start: u64,
     /// Crest factor on the fine grid.
     pub crest_factor: f64,
-    /// Crest factor of every start begun, in the order of their numbers.
+    /// Crest factor of every start that began, in the order of their numbers.
     pub crest_factors: Vec<f64>,
-    /// Phases [rad], wanted lines then snow.
+    /// Phases [rad], wanted lines first, then snow lines.
     pub phase: Vec<f64>,
-    /// Amplitudes of the snow, relative to the rms of the others' amplitudes.
+    /// Amplitudes of the snow lines, relative to the rms of the wanted amplitudes.
     pub snow: Vec<f64>,
-    /// Clipping iterations and Gauss-Newton steps of all starts.
+    /// Number of clipping iterations and of Gauss-Newton steps, summed over all starts.
     pub effort: (u64, u64),
-    /// Whether the time ended the search.
+    /// Whether the search was cut short, by its time limit or by cancellation.
     pub out_of_time: bool,
 }
 
-/// The best signal of one start.
+/// Best signal of one start.
 struct Best {
     fine: FineGrid,
     crest_factor: f64,
@@ -78,14 +78,14 @@ impl Best {
     }
 }
 
-/// Clip and refine from many starts; `None` if cancelled before any was begun.
+/// Search for the smallest crest factor by clipping and refinement from many starts.
 ///
-/// Of equal crest factors the lower start number wins, so the result does not depend on
-/// threads.
+/// Returns `None` if the search is cancelled before any start begins. Of equal crest factors the
+/// lower start number wins, so the result does not depend on the number of threads.
 ///
 /// # Errors
-/// [`ExcitationError`] for settings out of range, no starts, and phases that are not one
-/// number per wanted line.
+/// [`ExcitationError`] if a setting is out of range, there are no starts, the refinement has too
+/// many unknowns, or the given phases are not one finite number per wanted line.
 pub fn search(
     problem: &CrestProblem,
     start: &Start,
@@ -115,7 +115,7 @@ pub fn search(
     Ok(run(problem, start, clipping, refinement, budget, cancel))
 }
 
-/// What is left to do once everything has been checked.
+/// Run a search whose arguments have been checked.
 fn run(
     problem: &CrestProblem,
     start: &Start,
@@ -136,7 +136,7 @@ fn run(
         Start::Given(_) => 1,
     };
     let one = |run: u64| {
-        // The first start is always begun: there must be a result.
+        // Even without time left, the first start begins, because there must be a result.
         if cancel.load(Ordering::Relaxed) || (run > 0 && late()) {
             cut.store(true, Ordering::Relaxed);
             return None;
@@ -160,12 +160,12 @@ fn run(
         }
         Some((run, best.crest_factor, best.coefficient))
     };
-    // In order, so that a search cut short has done the first starts.
+    // The starts begin in order, so that a search cut short has done the first ones.
     let all = || (0..starts).par_bridge().filter_map(one).collect();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(budget.threads);
     let mut found: Vec<_> = match pool.build() {
         Ok(pool) => pool.install(all),
-        // No threads to be had: this one will do.
+        // If no threads can be started, the calling thread runs all starts.
         Err(_) => (0..starts).filter_map(one).collect(),
     };
     found.sort_unstable_by_key(|f| f.0);
