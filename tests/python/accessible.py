@@ -1,9 +1,9 @@
-"""Pages held against WCAG 2 AA by axe-core, in the browser that shows them."""
+"""WCAG 2 AA checks of pages by axe-core, in a real browser."""
 
 from importlib import resources
 from typing import Any
 
-# Of axe's four grades, those that keep somebody from reading or using a page.
+# The two of axe's four grades that keep a person from reading or using a page.
 _GRAVE = ("serious", "critical")
 _RUN = """async () => {
   const found = await axe.run(document, { resultTypes: ["violations"] });
@@ -13,13 +13,13 @@ _RUN = """async () => {
 
 
 def grave_findings(page: Any) -> list[Any]:
-    """What axe-core finds on an open page that is serious or worse: grade, rule and elements.
+    """Return the findings of axe-core on an open page that are serious or worse: grade, rule, elements.
 
-    ``page``: of Playwright, in a context that bypasses the content policy.
+    ``page``: a Playwright page, in a context that bypasses the content policy.
     """
     axe = resources.files("axe_playwright_python").joinpath("axe.min.js").read_text("utf-8")
     page.evaluate(axe)
     passed, broken = page.evaluate(_RUN)
-    # It did look.
+    # Axe must have checked something.
     assert passed > 5
     return [finding for finding in broken if finding[0] in _GRAVE]

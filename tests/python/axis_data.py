@@ -1,4 +1,4 @@
-"""Records of a two-mass axis for the tests of its fits."""
+"""Records of a two-mass axis, for tests of its fits."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TWO = AxisModel(gear_ratio=RATIO)
 
 
 def torque(n: int, seed: int, size: float = 6.0, hold: int = 40) -> np.ndarray:
-    """Steps of random height; the motor turns both ways and stands now and then."""
+    """Return steps of random height; the motor turns both ways and stands at times."""
     heights = np.random.default_rng(seed).normal(size=-(-n // hold))
     return size * np.repeat(heights, hold)[:n]
 
@@ -44,7 +44,7 @@ def record(
     noise: np.ndarray | float = 0.0,
     **options: object,
 ) -> AxisData:
-    """A simulated record with noise added to the output."""
+    """Return a simulated record with noise added to the output."""
     u = torque(n, seed, **options)
     y = model.simulate(truth, u, SAMPLE_S).output.values + noise
     key = "position_rad" if model.output == "position" else "velocity_rad_s"

@@ -1,4 +1,4 @@
-"""Recordings of ROS that tests write: joint states of a log, as rosbag2, MCAP or ROS 1 bag."""
+"""ROS recordings for tests: joint states of a log as rosbag2, MCAP or ROS 1 bag."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ START_NS = 1_700_000_000_000_000_000
 def joint_state(
     types: Any, stamp_ns: int, names: Sequence[str], fields: Sequence[Array], sequence: int
 ) -> Any:
-    """Return a message; ``fields`` are position, velocity and effort."""
+    """Return a joint state message; ``fields`` are position, velocity and effort."""
     known = types.types
     seconds, rest = divmod(stamp_ns, 1_000_000_000)
     stamp = known["builtin_interfaces/msg/Time"](sec=seconds, nanosec=rest)
@@ -46,10 +46,10 @@ def written_states(
     topic: str = "/joint_states",
     more: Callable[[Any, Any], None] | None = None,
 ) -> Path:
-    """Write joint states and return what to read: a folder, or a file of ``kind`` mcap or bag.
+    """Write joint states and return the path to read: a folder, or a file of ``kind`` mcap or bag.
 
-    ``fields``: position, velocity, effort (n, n_joints), each may be empty. ``more`` writes more, given
-    writer and types.
+    ``fields``: position, velocity, effort (n, n_joints), each may be empty. ``more(writer, types)`` may write
+    further topics.
     """
     types = ROS1 if kind == "bag" else ROS2
     plugin = StoragePlugin.SQLITE3 if kind == "rosbag2" else StoragePlugin.MCAP
@@ -73,9 +73,9 @@ _POINTS = {"new": ("reference", "feedback"), "old": ("desired", "actual")}
 def controller_states(
     names: Sequence[str], time_s: Array, told: Array, done: Array, age: str
 ) -> Callable[[Any, Any], None]:
-    """Return what writes states of a trajectory controller, targets and positions (n, n_joints).
+    """Return a function that writes a trajectory controller's targets and positions (n, n_joints).
 
-    ``age``: ``new`` or ``old`` names of their points.
+    ``age``: ``new`` or ``old`` names of the message's points.
     """
     points = _POINTS[age]
     fields = [f"trajectory_msgs/JointTrajectoryPoint {point}" for point in (*points, "error")]

@@ -1,4 +1,4 @@
-"""Known linear systems and their records, for the tests of black-box models."""
+"""Known linear systems and their records, for tests of black-box models."""
 
 import numpy as np
 from scipy import signal
@@ -6,20 +6,20 @@ from scipy import signal
 from axisight.records.experiment import Experiment
 
 T = 1e-3
-# A stable ARX system of two inputs and outputs, correlated disturbances.
+# A stable ARX system with two inputs and outputs and correlated disturbances.
 A1 = np.array([[-1.2, 0.1], [0.05, -0.9]])
 A2 = np.array([[0.6, 0.0], [-0.1, 0.3]])
 B1 = np.array([[0.5, -0.2], [0.1, 0.7]])
 B2 = np.array([[-0.3, 0.4], [0.2, 0.1]])
 MIX = np.array([[1.0, 0.5], [0.0, 1.0]])
 
-# An output-error system of one input.
+# An output-error system with one input.
 TOP = np.array([0.0, 0.2, 0.1])
 BOTTOM = np.array([1.0, -1.6, 0.8])
 
 
 def arx_experiment(n: int, noise: float, seed: int) -> Experiment:
-    """Records of the ARX system from rest, driven by white input."""
+    """Return records of the ARX system from rest, driven by white input."""
     rng = np.random.default_rng(seed)
     u = rng.normal(size=(n, 2))
     e = noise * rng.normal(size=(n, 2)) @ MIX
@@ -34,14 +34,14 @@ def arx_experiment(n: int, noise: float, seed: int) -> Experiment:
 
 
 def output_error_experiment(n: int, noise: float, seed: int) -> Experiment:
-    """Records of the output-error system from rest, white input and noise."""
+    """Return records of the output-error system from rest, with white input and noise."""
     rng = np.random.default_rng(seed)
     u = rng.normal(size=n)
     return Experiment(T, u, signal.lfilter(TOP, BOTTOM, u) + noise * rng.normal(size=n))
 
 
 def modal_system() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A, B, C of two lightly damped modes, two inputs and outputs."""
+    """Return A, B, C of two lightly damped modes with two inputs and outputs."""
     a = np.zeros((4, 4))
     for k, (omega, damping) in enumerate(((0.3, 0.02), (0.9, 0.03))):
         pole = np.exp(omega * (-damping + 1j * np.sqrt(1 - damping**2)))
@@ -54,7 +54,7 @@ def modal_system() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def modal_experiment(
     n: int, noise: float, seed: int, feedback: float = 0.0, process: float = 0.0
 ) -> Experiment:
-    """Records of the modal system; u = r - feedback (C B)^-1 y in closed loop."""
+    """Return records of the modal system; u = r - feedback (C B)^-1 y in closed loop."""
     a, b, c = modal_system()
     gain = feedback * np.linalg.inv(c @ b)
     rng = np.random.default_rng(seed)
@@ -67,6 +67,6 @@ def modal_experiment(
 
 
 def response(a, b, c, d, frequency_hz, step):
-    """C (z I - A)^-1 B + D."""
+    """Return C (z I - A)^-1 B + D."""
     z = np.exp(2j * np.pi * frequency_hz * step)
     return np.stack([c @ np.linalg.solve(s * np.eye(len(a)) - a, b) + d for s in z])

@@ -1,4 +1,4 @@
-"""A six-axis arm with elastic gears for the tests of calibration."""
+"""A six-axis arm with elastic gears, for tests of calibration."""
 
 import numpy as np
 
@@ -51,7 +51,7 @@ def configurations(n, seed):
 
 
 def truth(robot: Robot, seed=1, groups=GROUPS, size=1e-3, rotation=True):
-    """Errors of a millimetre and a milliradian, compliances off by a fifth."""
+    """Return geometry errors of about 1 mm and 1 mrad, with compliances off by a fifth."""
     start = nominal(robot)
     errors = errors_about(start, groups, rotation=rotation)
     theta = np.random.default_rng(seed).normal(0, size, len(errors.names))
@@ -62,6 +62,6 @@ def truth(robot: Robot, seed=1, groups=GROUPS, size=1e-3, rotation=True):
 
 
 def measured(robot, geometry, q, payload=0.0):
-    """Rotations and positions of the target, without noise."""
+    """Return noise-free rotations and positions of the target."""
     mass = np.broadcast_to(payload, (len(q),))
     return geometry.tool_location(q, load_torque(robot, q, mass, LOADS))

@@ -1,4 +1,4 @@
-"""The arm of `servo_arm` with motors, and a cascade of a drive that is told positions, simulated by MuJoCo."""
+"""The arm of `servo_arm` with motors under a drive's cascade with position targets, simulated by MuJoCo."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ STEP_S = 1e-3
 class Cascade:
     """Gains of position [1/s], speed [Nm s/rad] and its integral [Nm/rad].
 
-    ``fed``: targets go in lines from sample to sample of the log, and their rates are fed forward and logged.
+    ``fed``: targets are interpolated linearly between samples of the log; their rates are fed forward and
+    logged.
     """
 
     kv: tuple[float, float, float] = (14.0, 14.0, 14.0)
@@ -66,7 +67,7 @@ def simulator(folder: Path, arm: ServoArm, law: Cascade) -> Robot:
 
 
 def log_of(arm: ServoArm, law: Cascade, run: int, noise_rad: float = NOISE_RAD) -> Log:
-    """Return targets and positions of one run, from where the arm has settled; ``late_s`` of all targets."""
+    """Return targets and positions of one run from the settled arm; ``late_s`` delays all targets."""
     import mujoco  # noqa: PLC0415 - an extra
 
     model = mujoco.MjModel.from_xml_string(mjcf(arm))
@@ -109,7 +110,7 @@ def log_of(arm: ServoArm, law: Cascade, run: int, noise_rad: float = NOISE_RAD) 
     )
 
 
-# Of which gains of the drive say what a machine lacks: those of the speed loop of one axis.
+# Machines that differ in the drive's gains: factors on kp and ki of one axis' speed loop.
 _OTHER_GAINS: Mapping[str, tuple[float, float]] = {
     "torque_constant@2": (0.85, 0.85),
     "controller_gain@3": (0.8, 1.0),
@@ -117,7 +118,7 @@ _OTHER_GAINS: Mapping[str, tuple[float, float]] = {
 
 
 def machine_of(lacks: str, law: Cascade) -> tuple[ServoArm, Cascade]:
-    """Return a machine of `servo_arm.MACHINES` under a law, NOMINAL by another name."""
+    """Return a machine of `servo_arm.MACHINES` under a law; NOMINAL for a name that is not there."""
     if lacks not in _OTHER_GAINS:
         return MACHINES.get(lacks, NOMINAL), law
     at = int(lacks[-1]) - 1

@@ -1,4 +1,4 @@
-"""Made-up logs as makers write them, and robots of any number of axes that they are logs of."""
+"""Invented logs in the formats of makers, and matching robots with any number of axes."""
 
 import json
 from pathlib import Path
@@ -43,7 +43,7 @@ def robot(n_axes: int, names: list[str] | None = None) -> Robot:
 
 
 def motion(n_axes: int, n: int = 1500) -> dict[str, np.ndarray]:
-    """Joint-side position, velocity and torque (n, axes) in SI, and the time (n,)."""
+    """Return joint-side position, velocity and torque (n, axes) in SI units, and the time (n,)."""
     t = np.arange(n) / RATE_HZ
     w = 2 * np.pi * (0.3 + 0.1 * np.arange(n_axes))
     phase = np.outer(t, w)
@@ -58,7 +58,8 @@ def motion(n_axes: int, n: int = 1500) -> dict[str, np.ndarray]:
 
 DEG = 180 / np.pi
 RPM = 30 / np.pi
-# Maker -> (time, factor), then field -> (name with the axis in it, counted from, factor to the unit)
+# Maker -> (time, factor), then field -> (name with the axis number, first number, factor to the maker's
+# unit).
 MAKERS = {
     "ur-rtde": (
         ("timestamp", 1.0),
@@ -108,7 +109,7 @@ MAKERS = {
 
 
 def maker_columns(maker: str, n_axes: int) -> dict[str, np.ndarray]:
-    """The columns of a log as a maker names them, with one that no map uses."""
+    """Return the columns of a log under a maker's names, plus one that no map uses."""
     (time, factor), fields = MAKERS[maker]
     run = motion(n_axes)
     out = {time: run["time"] * factor, "some_flag": np.ones(run["time"].size)}
@@ -125,7 +126,7 @@ def write_csv(path: Path, columns: dict[str, np.ndarray], separator: str = ",") 
 def write_lerobot(
     folder: Path, episodes: int = 1, n_axes: int = 6, *, version: int = 2, effort: bool = True
 ) -> Path:
-    """Write a dataset as LeRobot does; episode k is k rad off, with lists in float32."""
+    """Write a dataset in LeRobot's format; episode k is shifted by k rad; lists are float32."""
     run = motion(n_axes, 600)
     frames = []
     for k in range(episodes):

@@ -1,4 +1,4 @@
-"""Fixtures that find the shared data and practice cases, or say plainly what is absent."""
+"""Fixtures that find the shared data and practice cases, or say plainly what is missing."""
 
 import os
 import sys
@@ -12,7 +12,7 @@ settings.load_profile("axisight")
 
 _REPOSITORY = Path(__file__).resolve().parents[2]
 
-# Tests of one room use helpers of another: every folder can be imported from.
+# Tests in one folder use helpers from another, so every folder must be importable.
 _HERE = Path(__file__).parent
 sys.path.extend(sorted({str(test.parent) for test in _HERE.rglob("test_*.py")} - {str(_HERE)}))
 
@@ -25,7 +25,7 @@ def _data_folder() -> Path | None:
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """The folder of real measured data; the test is skipped, and counted, without it."""
+    """Return the folder of real measured data; without it the test is skipped, and counted."""
     folder = _data_folder()
     if folder is None:
         pytest.skip("real data not found: set AXISIGHT_DATA")
@@ -34,11 +34,11 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def shared(shared_data: Path) -> Path:
-    """The folder above the real data: practice cases, robot, specifications."""
+    """Return the folder above the real data: practice cases, robot, specifications."""
     return shared_data.parent
 
 
 @pytest.fixture(scope="session")
 def repository() -> Path:
-    """The root of this repository."""
+    """Return the root of this repository."""
     return _REPOSITORY

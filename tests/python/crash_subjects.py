@@ -1,4 +1,4 @@
-"""What the crash trial is tried on: a Monte Carlo study and a fleet; both go on where they were stopped."""
+"""Subjects of the crash trial: a Monte Carlo study and a fleet. Both resume where they were stopped."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from axisight.fleet import diagnose_fleet
 from fleet_data import write_case
 from montecarlo_data import same_bits, small_study, start
 
-# To call with what has been done so far.
+# Callback with the number of steps done so far.
 Told = Callable[[int], None]
 
 
@@ -23,26 +23,26 @@ class Subject(ABC):
 
     name: str
     steps: int
-    """How often it says what has been done."""
+    """How often the work calls ``told``."""
 
     @abstractmethod
     def process(self, out: Path) -> subprocess.Popen[bytes]:
-        """Begin it, or go on with it, in a process of its own."""
+        """Start or resume the work in its own process."""
 
     @abstractmethod
     def finish(self, out: Path) -> object:
-        """Return what comes out when it has been gone on with to its end."""
+        """Resume the work to its end and return the result."""
 
     @abstractmethod
     def on_cluster(self, out: Path, scheduler: str, told: Told) -> object:
-        """Return the same, done by the workers of a scheduler."""
+        """Return the result as computed by the workers of a scheduler."""
 
     @abstractmethod
     def compare(self, found: object, whole: object) -> None:
-        """Raise AssertionError where bits differ."""
+        """Raise AssertionError if any bit differs."""
 
     def few(self) -> Subject:
-        """Return one with fewer files, of which each is damaged."""
+        """Return a subject with fewer files, for the trial that damages each of them."""
         return self
 
 
@@ -60,7 +60,7 @@ class Studies(Subject):
         self.study = small_study(runs=runs, block_runs=8)
 
     def process(self, out: Path) -> subprocess.Popen[bytes]:
-        """Begin it, or go on with it."""
+        """Start or resume the study."""
         return start("-c", _RUN_STUDY, str(Path(__file__).parent), str(out), str(self.runs))
 
     def finish(self, out: Path) -> object:
@@ -82,12 +82,12 @@ class Studies(Subject):
         same_bits(found, whole)
 
     def few(self) -> Subject:
-        """Return one of three blocks."""
+        """Return a study of three blocks."""
         return Studies(24)
 
 
 class Fleets(Subject):
-    """Cases of small axes: what runs the benchmark of withheld effects, too."""
+    """Cases of small axes; the benchmark of withheld effects runs the same code."""
 
     name = "fleet"
 
@@ -99,17 +99,17 @@ class Fleets(Subject):
             write_case(folder / "welder" / f"day_{day}", effects, day)
 
     def process(self, out: Path) -> subprocess.Popen[bytes]:
-        """Begin it, or go on with it, by the command."""
+        """Start or resume the fleet by its command."""
         call = "import sys; from axisight.cli import main; sys.argv[0] = 'axisight'; main()"
         where = ["--fleet", str(self.folder), "--out", str(out), "--workers", "2", "-q"]
         return start("-c", call, "diagnose", *where, stderr=subprocess.DEVNULL)
 
     def finish(self, out: Path) -> object:
-        """Return its verdicts."""
+        """Return the verdicts."""
         return diagnose_fleet(self.folder, out, Settings(), workers=2)
 
     def on_cluster(self, out: Path, scheduler: str, told: Told) -> object:
-        """Return its verdicts."""
+        """Return the verdicts."""
         return diagnose_fleet(
             self.folder,
             out,
@@ -124,7 +124,7 @@ class Fleets(Subject):
 
 
 def subjects(folder: Path) -> list[Subject]:
-    """Return all of them; what they need goes to a folder."""
+    """Return all subjects; ``folder`` holds the files that they need."""
     if sys.platform == "win32":
         raise SystemExit("the crash trial kills as POSIX does")
     return [Studies(), Fleets(folder / "fleet")]

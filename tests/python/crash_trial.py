@@ -1,10 +1,15 @@
-"""The crash trial, ``make crash``: what is killed, damaged and starved ends in the same bits or in a clear refusal.
+"""The crash trial, ``make crash``: killed, damaged and starved work gives the same bits or a clear refusal.
 
     python tests/python/crash_trial.py [KILLS] [SEED] [SUBJECT]
 
-Of a Monte Carlo study and of a fleet: kills of the process that computes, with its children, at random
-moments; every file that a finished one left damaged in turn; a file system that is full (Linux, as root);
-workers of a Dask cluster killed. Prints what came out and ends with status 1 if anything was lost.
+The trial does four things to a Monte Carlo study and to a fleet:
+
+- it kills the computing process with its children, at random moments;
+- it damages every file of a finished run in turn;
+- it fills up the file system (Linux, as root);
+- it kills workers of a Dask cluster.
+
+It prints the outcomes and ends with status 1 if anything was lost.
 """
 
 from __future__ import annotations
@@ -28,7 +33,7 @@ from crash_subjects import Subject, subjects
 from montecarlo_data import dask_cluster, kill
 
 TIMES = 10
-"""Full disks and dead workers."""
+"""Number of trials with full disks and with dead workers."""
 
 
 def compared(subject: Subject, out: Path, whole: object) -> str:
@@ -39,7 +44,7 @@ def compared(subject: Subject, out: Path, whole: object) -> str:
         return f"refused: {type(error).__name__}"
     except AssertionError:
         return "LOST: other bits"
-    except Exception as error:  # anything else is a failure of the trial's subject
+    except Exception as error:  # any other exception is a failure of the subject
         return f"LOST: {type(error).__name__}: {error}"
     return "same"
 
@@ -47,7 +52,7 @@ def compared(subject: Subject, out: Path, whole: object) -> str:
 def killed(
     subject: Subject, folder: Path, whole: object, kills: int, rng: np.random.Generator
 ) -> Counter[str]:
-    """Kill a computing process ``kills`` times, at any moment of its life; compare what remains each time."""
+    """Return outcomes of ``kills`` kills of a computing process at random moments, compared after each."""
     begun = time.monotonic()
     subject.process(folder / "whole").wait(timeout=300)
     life_s = time.monotonic() - begun
@@ -57,7 +62,7 @@ def killed(
         process = subject.process(out)
         with suppress(subprocess.TimeoutExpired):
             process.wait(timeout=float(rng.uniform(0.2, 1.0)) * life_s)
-        # Its children too: nothing is left that could finish the work.
+        # Children too, so that nothing is left to finish the work.
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait(timeout=10)
@@ -67,7 +72,7 @@ def killed(
 
 
 def damaged(subject: Subject, folder: Path, rng: np.random.Generator) -> Counter[str]:
-    """Damage every file of a finished folder in turn: a byte changed, the end cut off, all taken away."""
+    """Return outcomes of damage to each file of a finished folder: a changed byte, a cut end, no content."""
     good = folder / "good"
     whole = subject.finish(good)
     found: Counter[str] = Counter()
@@ -92,7 +97,7 @@ def _cut(path: Path) -> None:
 
 
 def starved(subject: Subject, folder: Path, whole: object) -> Counter[str]:
-    """Compute on a file system that is full at one size after another, then go on where there is room."""
+    """Return outcomes of work on file systems that fill up at different sizes, resumed with more space."""
     found: Counter[str] = Counter()
     for number in range(TIMES):
         small, out = folder / f"small{number}", folder / f"room{number}"
@@ -113,7 +118,7 @@ def starved(subject: Subject, folder: Path, whole: object) -> Counter[str]:
 def orphaned(
     subject: Subject, folder: Path, whole: object, rng: np.random.Generator
 ) -> Counter[str]:
-    """Kill one of two workers of a cluster in the middle of the work."""
+    """Return outcomes of killing one of two cluster workers in the middle of the work."""
     found: Counter[str] = Counter()
     for number in range(TIMES):
         where = folder / f"cluster{number}"
@@ -137,7 +142,7 @@ def orphaned(
 
 
 def tried(subject: Subject, folder: Path, kills: int, seed: int) -> int:
-    """Run all trials on a subject; return how often something was lost."""
+    """Run all trials on a subject; return the number of losses."""
     rng = np.random.default_rng(seed)
     whole = subject.finish(folder / "once")
     trials = {
@@ -158,7 +163,7 @@ def tried(subject: Subject, folder: Path, kills: int, seed: int) -> int:
 
 
 def main(kills: int = 100, seed: int = 0, only: str | None = None) -> int:
-    """Try every subject, or ``only`` one; 1 where anything was lost."""
+    """Run the trial on every subject, or on ``only`` one; return 1 if anything was lost."""
     lost = 0
     with tempfile.TemporaryDirectory() as name:
         for subject in subjects(Path(name)):

@@ -1,4 +1,4 @@
-"""Damage of any kind to a file, seeded, and what reading so many of them may come to."""
+"""Seeded damage of all kinds to files, and limits on what reading them may do."""
 
 import os
 
@@ -6,15 +6,15 @@ import numpy as np
 
 from reading_children import wrong
 
-# Of each format; `make fuzz` asks for more.
+# Number of damaged files per format; `make fuzz` sets more.
 TIMES = int(os.environ.get("AXISIGHT_FUZZ", "1000"))
 
 
 def mutated(data: bytes, rng: np.random.Generator) -> bytes:
-    """The bytes with one kind of damage: changed, taken out, put in twice, cut off, or set to extremes."""
+    """Return the bytes with one kind of damage: changed, removed, repeated, cut off, or set to extremes."""
     spoiled = bytearray(data)
     at = int(rng.integers(len(data)))
-    if rng.random() < 0.4:  # structure stands at the ends of most formats
+    if rng.random() < 0.4:  # most formats have their structure at the ends
         at = int(rng.choice([at % 512, len(data) - 1 - at % 512])) % len(data)
     long = int(rng.integers(1, 9))
     kind = rng.integers(7)
@@ -28,7 +28,7 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
         spoiled[at:at] = spoiled[at : at + 4 * long]
     elif kind == 4:
         del spoiled[at:]
-    elif kind == 5:  # where types stand as small numbers, another one
+    elif kind == 5:  # some formats state types as small numbers
         spoiled[at - at % 8] = int(rng.integers(32))
     else:
         spoiled[at : at + long] = rng.choice([b"\0", b"\xff", b"\x7f"]) * long
@@ -36,7 +36,7 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def batch(folder, path, rng, times=TIMES):
-    """Files with damage, as many of the same suffix."""
+    """Write ``times`` damaged files with the suffix of the original."""
     data, paths = path.read_bytes(), []
     for number in range(times):
         paths.append(folder / f"{number}{path.suffix}")

@@ -1,4 +1,4 @@
-"""Made-up diagnoses, one per verdict, shared by the report and plot tests."""
+"""Invented diagnoses, one per verdict, for the tests of reports and plots."""
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
@@ -34,7 +34,7 @@ VERDICTS = ("none", "explained", "unknown", "undecidable")
 
 
 def shares(dim: str, labels: list[str], n_axes: int, seed: int, strength: float) -> xr.Dataset:
-    """A map whose axis 2 (or only axis) has a few significant cells."""
+    """Return a map with a few significant cells on axis 2, or on the only axis."""
     rng = np.random.default_rng(seed)
     share = rng.dirichlet(np.full(len(labels), 0.7), size=n_axes)
     significance = rng.normal(0.5, 1.0, share.shape)
@@ -52,7 +52,7 @@ def shares(dim: str, labels: list[str], n_axes: int, seed: int, strength: float)
 
 
 def overlay(log: str, axis: int, n: int = 6000, error: float = 0.6) -> Overlay:
-    """Torque with friction missing before and most of it present after."""
+    """Return an overlay: the simulator lacks friction before, and has most of it after."""
     t = np.arange(n) / 500.0
     rng = np.random.default_rng(axis)
     speed = np.sin(2 * np.pi * 0.4 * t + axis) + 0.3 * np.sin(2 * np.pi * 1.7 * t)
@@ -65,7 +65,7 @@ def overlay(log: str, axis: int, n: int = 6000, error: float = 0.6) -> Overlay:
 
 
 def gap(before: float, refitted: float, after: float, floor: float, n_axes: int) -> Gap:
-    """A gap whose second axis is the worst."""
+    """Return a gap that is largest on the second axis."""
     spread = np.array([0.6, 1.5, 0.8, 0.9, 0.7, 1.1, 1.0])[:n_axes]
     return Gap(
         before, refitted, after, floor,
@@ -75,7 +75,7 @@ def gap(before: float, refitted: float, after: float, floor: float, n_axes: int)
 
 
 def ranking(first: float = 0.97) -> tuple[Candidate, ...]:
-    """Twelve candidates, most probable first."""
+    """Return twelve candidates, the most probable first."""
     rest = 1 - first
     effects = [
         ("coulomb_friction", 2, first), ("stribeck_friction", 2, 0.6 * rest),
@@ -92,7 +92,7 @@ def ranking(first: float = 0.97) -> tuple[Candidate, ...]:
 
 
 def explained(n_axes: int = 3) -> Diagnosis:
-    """Coulomb friction on axis 2 (or the only axis) explains the gap."""
+    """Return a diagnosis in which Coulomb friction on axis 2 (or the only axis) explains the gap."""
     axis = min(2, n_axes)
     cause = Cause(
         "coulomb_friction", axis, 0.97,
@@ -180,7 +180,7 @@ def explained(n_axes: int = 3) -> Diagnosis:
 
 
 def of(verdict: str) -> Diagnosis:
-    """A diagnosis with this verdict."""
+    """Return a diagnosis with this verdict."""
     base = explained()
     if verdict == "explained":
         return base
@@ -208,7 +208,7 @@ def of(verdict: str) -> Diagnosis:
 
 
 def one_prismatic() -> Diagnosis:
-    """One sliding axis, shares missing here and there."""
+    """Return a diagnosis of one prismatic axis, with some shares missing."""
     base = explained(1)
     band = base.band_map.copy(deep=True)
     band["share"][0, 2:4] = np.nan
@@ -225,7 +225,7 @@ HOSTILE = (
 
 
 def hostile() -> Diagnosis:
-    """Every piece of text is an attack."""
+    """Return a diagnosis in which every text is an attack."""
     bad = HOSTILE
     base = explained()
     relabel = {"bin": [f"{bad}{i}" for i in range(4)]}
@@ -244,7 +244,7 @@ def hostile() -> Diagnosis:
 
 
 def named_everywhere(text: str) -> Diagnosis:
-    """A diagnosis that has every part, each of its texts replaced by ``text``."""
+    """Return a diagnosis with every part, and with ``text`` in place of each text."""
     base = replace(
         explained(),
         detection_limits=(DetectionLimit("payload", None, "mass_kg", 0.2, "kg"),),
@@ -252,7 +252,7 @@ def named_everywhere(text: str) -> Diagnosis:
         next_experiment="Hold still.",
     )
     named = _named(base, text)
-    # These three are one of a few words each.
+    # These three fields admit only a few words.
     gap = replace(named.gap, compared=base.gap.compared)
     return replace(named, mode=base.mode, verdict=base.verdict, gap=gap)
 

@@ -1,4 +1,4 @@
-"""The readers of the package, each by a name and called with a path."""
+"""All readers of the package by name; each takes a path."""
 
 import shutil
 
@@ -20,7 +20,7 @@ position = { name = "joint_states.position.a", unit = "rad" }
 
 
 def case(path):
-    """A case has its name from its folder's file."""
+    """Read a case from a copy of its file, in a folder of its own."""
     folder = path.parent.parent / f"case_{path.stem}"
     folder.mkdir()
     read_case(shutil.copy(path, folder / "case.toml").parent)

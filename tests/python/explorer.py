@@ -1,4 +1,4 @@
-"""The explorer in a process of its own and Chromium before it, for tests and benches."""
+"""The explorer in its own process with Chromium as its client, for tests and benches."""
 
 import os
 import re
@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 
 from playwright.sync_api import expect, sync_playwright
 
-# Machines that test are busy.
+# Test machines are busy.
 expect.set_options(timeout=30_000)
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
@@ -24,14 +24,14 @@ _COMMAND = [sys.executable, "-u", "-c", "from axisight.cli import main; main()",
 
 @dataclass
 class Running:
-    """``url``: where the page is, with its token; ``status``: exit status, once it has ended."""
+    """A running explorer: ``url`` with its token; ``status``: exit status after the end."""
 
     url: str
     status: int | None = None
 
     @property
     def origin(self) -> str:
-        """Scheme, address and port."""
+        """Return scheme, address and port."""
         parts = urlsplit(self.url)
         return f"{parts.scheme}://{parts.netloc}"
 
@@ -62,7 +62,7 @@ def explorer(*arguments: str | Path) -> Iterator[Running]:
         finally:
             process.send_signal(signal.SIGINT)
             try:
-                # Work that runs ends its step first, which takes long on a busy machine.
+                # Running work ends its step first, which is slow on a busy machine.
                 process.communicate(timeout=90)
             except subprocess.TimeoutExpired:
                 process.kill()
@@ -72,7 +72,7 @@ def explorer(*arguments: str | Path) -> Iterator[Running]:
 
 @dataclass
 class Visit:
-    """A page, and what went wrong on it: errors on its console, requests that left this machine."""
+    """A visited page with its failures: console errors, and requests to other machines."""
 
     page: Any
     origin: str
@@ -88,27 +88,27 @@ class Visit:
             self.wrong.append(f"console: {message.text[:300]}")
 
     def watch(self) -> None:
-        """Begin to listen."""
+        """Start to record failures."""
         self.page.on("request", self._request)
         self.page.on("console", self._console)
         self.page.on("pageerror", lambda error: self.wrong.append(f"error: {error}"))
         self.page.on("dialog", lambda dialog: self.wrong.append(f"dialog: {dialog.message}"))
 
     def cell(self, table: str, row: int, column: str) -> Any:
-        """The cell of a table by its row, from 1, and the head of its column."""
+        """Return a cell of a table by its row (from 1) and column title."""
         heads = self.page.locator(f"#{table} th").all_inner_texts()
         return self.page.locator(f"#{table} tbody tr:nth-child({row}) > *").nth(heads.index(column))
 
     def share(self, table: str, row: int, column: str) -> float:
-        """A cell of per cents as a number."""
+        """Return a percentage in a cell as a number."""
         return float(self.cell(table, row, column).inner_text().removesuffix("%"))
 
     def click(self, name: str) -> None:
-        """Press the first button of a name."""
+        """Click the first button with a name."""
         self.page.get_by_role("button", name=name, exact=True).first.click()
 
     def choose(self, label: str, option: str) -> None:
-        """Choose an option of the list with a label."""
+        """Choose an option in the list with a label."""
         self.page.get_by_label(label, exact=True).select_option(label=option)
 
 

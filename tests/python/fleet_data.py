@@ -1,4 +1,4 @@
-"""Cases of one axis for the tests of fleets and the crash trial."""
+"""One-axis cases for the tests of fleets and for the crash trial."""
 
 import re
 from pathlib import Path
@@ -13,7 +13,7 @@ HELD = {"fresh": ("multisine", 9)}
 
 
 def write_case(folder: Path, effects: list[Effect], seed: int) -> None:
-    """Write a case of the two-mass axis, whose machine scatters and has effects."""
+    """Write a case of the two-mass axis; the machine has production scatter and these effects."""
     machine = scattered(bare_axis(), seed)
     case = CaseFolder(folder, folder.name)
     for role, plan in (("estimation", PLAN), ("validation", HELD)):
@@ -21,7 +21,7 @@ def write_case(folder: Path, effects: list[Effect], seed: int) -> None:
             data = log.velocity_ref_rad_s, log.torque_nm, log.position_rad
             case.add(log.name, role, log.time_s, *data)
     case.finish("two_mass_axis")
-    # The preset has effects of its own, which these machines have not.
+    # The preset has effects that these machines lack.
     path = folder / "robot.toml"
     path.write_text(re.sub(r"\[\[effect\]\][^\[]*", "", path.read_text("utf-8")), "utf-8")
     assert load_robot(path).effects == ()

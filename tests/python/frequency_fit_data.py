@@ -1,4 +1,4 @@
-"""Synthetic responses of the preset robot with known truth."""
+"""Synthetic responses of the preset robot with known parameters."""
 
 from collections.abc import Sequence
 
@@ -46,7 +46,7 @@ def response(
     robot: Robot = ROBOT,
     lines_hz: Real = LINES_HZ,
 ) -> MeasuredResponse:
-    """A response with circular complex noise; without noise the stated variance is 1 %."""
+    """Return a response with circular complex noise; without noise it states a variance of 1 %."""
     g = model_response(robot, lines_hz, pose, quantity="acceleration").values
     std = (relative_noise or 0.1) * np.abs(g)
     error = rng.normal(size=(2, *g.shape)) * np.sqrt(0.5) * (relative_noise > 0)

@@ -1,4 +1,4 @@
-"""A known discrete-time loop with several inputs, its records and its exact response."""
+"""A known discrete-time loop with several inputs: its records and its exact response."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ GAIN = 0.15
 
 
 def plant(frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """G(exp(i w T)) = C (z I - A)^-1 B, (n_freq, 2, 2)."""
+    """Return G(exp(i w T)) = C (z I - A)^-1 B, (n_freq, 2, 2)."""
     z = np.exp(2j * np.pi * frequency_hz * T)
     return np.stack([C @ np.linalg.solve(s * np.eye(4) - A, B) for s in z])
 
@@ -37,11 +37,11 @@ def loop_records(
     lines: NDArray[np.int64] | None = None,
     n_runs: int | None = None,
 ) -> list[PeriodicRecords]:
-    """Closed-loop records of random-phase multisines in steady state, one set for each run.
+    """Return closed-loop records of random-phase multisines in steady state, one set per run.
 
-    White noise of standard deviation ``noise`` is added to the measured output that the
-    controller feeds back and to the measured input; the two are made periodic over all
-    periods together, so that steady state is exact: every run is computed line by line.
+    The measured output, which the controller feeds back, and the measured input have white noise of standard
+    deviation ``noise``. The noise is periodic over all periods together, so that an exact steady state can be
+    computed line by line.
     """
     lines = np.arange(2, 40, 3) if lines is None else lines
     rng = np.random.default_rng(seed)

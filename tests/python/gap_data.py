@@ -1,4 +1,4 @@
-"""One elastic axis with effects withheld from its simulator, and evidence made by hand."""
+"""One elastic axis with effects that its simulator lacks, and evidence made by hand."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,12 +15,12 @@ HELD = {"fresh": ("multisine", 9), "other": ("moves", 3)}
 
 
 def bare_axis() -> Robot:
-    """The two-mass axis as a simulator that models no effect."""
+    """Return the two-mass axis as a simulator without effects."""
     return load_robot("two_mass_axis").with_effects([])
 
 
 def bare_case(folder: Path, logs: Sequence[Log]) -> Path:
-    """Write a case of that axis, the last log to validate; return its folder."""
+    """Write a case of that axis with the last log for validation; return its folder."""
     case = CaseFolder(folder, "bare")
     for k, log in enumerate(logs):
         role = "validation" if k == len(logs) - 1 else "estimation"
@@ -50,7 +50,7 @@ def reference(kind: str, seed: int, n: int, sample_time_s: float) -> np.ndarray:
 def log_of(
     machine: Robot, effects: list[Effect], reference: np.ndarray, run: int, name: str = ""
 ) -> Log:
-    """The log of a simulated run along a velocity reference (n, n_axes)."""
+    """Return the log of a simulated run along a velocity reference (n, n_axes)."""
     data = simulate(machine, reference, effects=effects, noise_seed=5, run=run)
     assert data.attrs["status"] == "completed"
     name = name or f"run{run}"
@@ -71,7 +71,7 @@ def logs_of(
     plan: dict[str, tuple[str, int]],
     seconds: float = 6.0,
 ) -> list[Log]:
-    """Logs by name: kind of reference and seed."""
+    """Return logs by name; ``plan`` gives kind of reference and seed."""
     out = []
     n = int(seconds / machine.sample_time_s)
     for run, (name, (kind, seed)) in enumerate(plan.items()):
@@ -81,7 +81,7 @@ def logs_of(
 
 
 def scattered(robot: Robot, seed: int) -> Robot:
-    """About one per cent off in everything, as any other machine of the type."""
+    """Return a robot with about 1 % scatter in every parameter, like another machine of the type."""
     rng = np.random.default_rng(seed)
     spread = {"stiffness": 0.01, "damping": 0.05, "motor_inertia": 0.01, "viscous_friction": 0.02}
     values = {
@@ -93,7 +93,7 @@ def scattered(robot: Robot, seed: int) -> Robot:
 
 
 def linear_evidence(x: np.ndarray, y: np.ndarray, log: np.ndarray, block: int = 20) -> FittedModel:
-    """Evidence of an ordinary least-squares fit of y on x, cut into blocks."""
+    """Return the evidence of an ordinary least-squares fit of y on x, cut into blocks."""
     theta = np.linalg.lstsq(x, y, rcond=None)[0]
     residual = x @ theta - y
     starts = np.arange(0, len(y), block)
@@ -128,7 +128,7 @@ def linear_evidence(x: np.ndarray, y: np.ndarray, log: np.ndarray, block: int = 
 
 
 class StateStub(SimpleNamespace):
-    """A state of a search that takes whatever model a move makes."""
+    """A search state that accepts whatever model a move makes."""
 
     def moved(self, _move: str, model: object) -> None:
         self.model = model

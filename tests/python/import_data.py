@@ -1,4 +1,4 @@
-"""Model files that tests write: a small URDF and MJCF, and what a broken one has in their place."""
+"""Model files for tests: a small URDF and MJCF, and broken variants of them."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ three,standard,0.4,0.1,0,-1.2,1,0,0.02,0.1,0.01,0.01,0.004,0
 
 
 def dh_toml(table: str = DH) -> str:
-    """Return the TOML that says the same as a CSV of one convention, numbers as they stand there."""
+    """Return the TOML that equals a CSV of one DH convention, with the same numbers."""
     head, *rows = [line.split(",") for line in table.splitlines()]
     tables = [dict(zip(head, row, strict=True)) for row in rows]
     (convention,) = {row.pop("convention") for row in tables}

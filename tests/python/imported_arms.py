@@ -1,4 +1,4 @@
-"""How far inverse dynamics of an imported robot are from those of the library that owns the format."""
+"""Differences between an imported robot's inverse dynamics and those of the format's own library."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def states(robot: Robot, count: int) -> tuple[Array, Array, Array]:
 
 
 def difference_to_pinocchio(robot: Robot, model: Any, count: int = 1000) -> float:
-    """Return the largest difference, relative to the largest force, at random states.
+    """Return the largest difference to Pinocchio at random states, relative to the largest force.
 
-    Joints of the model that the robot does not have stand still at zero.
+    Joints of the model that the robot lacks stay at zero.
     """
     data = model.createData()
     joints = [model.joints[model.getJointId(name)] for name in robot.joint_names]
@@ -41,13 +41,13 @@ def difference_to_pinocchio(robot: Robot, model: Any, count: int = 1000) -> floa
         rates, accelerations = np.zeros(model.nv), np.zeros(model.nv)
         rates[speeds], accelerations[speeds] = v[k], a[k]
         wanted[k] = pinocchio.rnea(model, data, configuration, rates, accelerations)[speeds]
-    # Rotors are no part of rnea, but for what a model calls armature.
+    # Rotors are not part of rnea, except those that the model states as armature.
     wanted -= a * np.array(model.armature)[speeds]
     return float(np.abs(robot.inverse_dynamics(q, v, a) - wanted).max() / np.abs(wanted).max())
 
 
 def difference_to_mujoco(robot: Robot, model: Any, count: int = 1000) -> float:
-    """Return the same for MuJoCo, without its drives, springs and contacts."""
+    """Return the largest difference to MuJoCo, without its drives, springs and contacts."""
     for quantity in (model.dof_armature, model.dof_damping, model.dof_frictionloss):
         quantity[:] = 0
     model.jnt_stiffness[:] = 0

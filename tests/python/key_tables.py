@@ -1,4 +1,4 @@
-"""Tables of keys in pages, and the keys of the classes that read the files."""
+"""Key tables in pages, and the keys of the classes that read the files."""
 
 import re
 from typing import Any, get_args
@@ -8,9 +8,9 @@ from pydantic.fields import FieldInfo
 
 
 def keys(model: type[BaseModel], *, leaves: tuple[type[BaseModel], ...] = ()) -> dict[str, str]:
-    """The keys of a file, with dots, and what a table says of their defaults; "" for a section of defaults.
+    """Return the dotted keys of a file with their defaults as in a table; "" for a section of defaults.
 
-    Classes in ``leaves`` have their keys in a table of their own.
+    Classes in ``leaves`` have tables of their own.
     """
     found = {}
     for name, field in model.model_fields.items():
@@ -24,7 +24,7 @@ def keys(model: type[BaseModel], *, leaves: tuple[type[BaseModel], ...] = ()) ->
 
 
 def told(section: str) -> dict[str, str]:
-    """The keys in the first column of the tables of a section, and the last column: their defaults."""
+    """Return the keys in the first column of a section's tables, with the last column: their defaults."""
     rows = re.findall(r"^\| (`.*) \|$", section, flags=re.MULTILINE)
     cells = [re.split(r" ?(?<!\\)\| ?", row) for row in rows]
     names = [(re.findall(r"`\[*([\w.]+)\]*`", row[0]), row[-1]) for row in cells]
@@ -34,7 +34,7 @@ def told(section: str) -> dict[str, str]:
 
 
 def same(said: dict[str, str], known: dict[str, str]) -> None:
-    """Every key stands in the table, no other does, and all with their defaults."""
+    """Assert that the table has exactly these keys, with their defaults."""
     assert set(said) == set(known)
     assert {k: said[k] for k, v in known.items() if re.split("[;:]", said[k])[0] != v} == {}
 

@@ -1,4 +1,4 @@
-"""A sampled system with known transient, and the local methods written a second time."""
+"""A sampled system with a known transient, and a second implementation of the local methods."""
 
 import numpy as np
 from scipy.signal import lfilter
@@ -7,7 +7,7 @@ POLES = (0.9 * np.exp(0.8j), 0.9 * np.exp(-0.8j))
 
 
 class System:
-    """Transfer matrix with common denominator and random numerators of the same order."""
+    """Transfer matrix with a common denominator and random numerators of the same order."""
 
     def __init__(self, n_outputs, n_inputs, poles=POLES, seed=0):
         self.denominator = np.real(np.poly(poles))
@@ -15,7 +15,7 @@ class System:
         self.numerators = np.random.default_rng(seed).normal(size=(n_outputs, n_inputs, n))
 
     def response(self, lines, n_samples):
-        """G(exp(i w T)) at lines of records of n_samples, (line, output, input)."""
+        """Return G(exp(i w T)) at lines of records of n_samples, (line, output, input)."""
         powers = np.exp(-2j * np.pi * np.asarray(lines) / n_samples)[:, None] ** np.arange(
             len(self.denominator)
         )
@@ -23,7 +23,7 @@ class System:
         return numerators / (powers @ self.denominator)[:, None, None]
 
     def run(self, u, rng, transient=1.0):
-        """Output (experiment, sample, output) from a random initial state."""
+        """Return the output (experiment, sample, output) from a random initial state."""
         n_outputs, n_inputs, n = self.numerators.shape
         y = np.zeros((*u.shape[:2], n_outputs))
         for e in range(len(u)):
@@ -37,10 +37,10 @@ class System:
 
 
 def plain_local_model(u, y, line, *, order, denominator_order, half_width):
-    """One line by one least-squares problem in monomials of the line number, for one output.
+    """Return one line by one least-squares problem in monomials of the line number, for one output.
 
-    Response (n_inputs,) and, for denominator_order 0, its variance; all unknowns in one
-    matrix, solved by LAPACK's singular value decomposition.
+    Response (n_inputs,) and, for denominator_order 0, its variance; all unknowns in one matrix, solved by
+    LAPACK's singular value decomposition.
     """
     experiments, n_samples, n_inputs = u.shape
     spectrum_u, spectrum_y = np.fft.fft(u, axis=1), np.fft.fft(y[..., 0], axis=1)
@@ -69,6 +69,6 @@ def plain_local_model(u, y, line, *, order, denominator_order, half_width):
 
 
 def band(variance, degrees_of_freedom, probability=0.95):
-    """Squared radius of the exact band when the variance is estimated."""
+    """Return the squared radius of the exact band for an estimated variance."""
     q = degrees_of_freedom
     return q * ((1 - probability) ** (-1 / q) - 1) * variance

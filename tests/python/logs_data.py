@@ -1,4 +1,4 @@
-"""Small made-up logs and writers of every format, shared by the log tests."""
+"""Small invented logs and writers of every format, for the log tests."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ RATE_HZ = 500.0
 
 
 def native_columns(n: int = 1000, n_axes: int = 2, rate_hz: float = RATE_HZ) -> dict:
-    """Native columns of a smooth run; velocity_ref is the exact derivative of the position."""
+    """Return native columns of a smooth run; velocity_ref is the exact derivative of the position."""
     t = np.arange(n) / rate_hz
     columns = {"time_s": t}
     for axis in range(1, n_axes + 1):
@@ -23,7 +23,7 @@ def native_columns(n: int = 1000, n_axes: int = 2, rate_hz: float = RATE_HZ) -> 
 
 
 def write_mat73(path: Path, columns: dict) -> None:
-    """Write as MATLAB v7.3 does: HDF5 behind a 512-byte header, row vectors stored transposed."""
+    """Write in MATLAB v7.3's format: HDF5 behind a 512-byte header, row vectors transposed."""
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, values in columns.items():
             stored = np.atleast_2d(values).T if np.ndim(values) < 2 else np.asarray(values).T

@@ -1,4 +1,4 @@
-"""Two masses with LuGre friction on the motor, written out in NumPy, in the sampled loop."""
+"""Two masses with LuGre friction on the motor under the sampled loop, in plain NumPy."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ KP, KI, SAMPLE_TIME_S = 7.0, 180.0, 5e-4
 
 @dataclass(frozen=True)
 class Lugre:
-    """Friction of Canudas de Wit et al. (1995) as ``presliding_friction`` takes it."""
+    """Friction of Canudas de Wit et al. (1995) in the parametrization of ``presliding_friction``."""
 
     coulomb_nm: float
     static_ratio: float
@@ -25,7 +25,7 @@ class Lugre:
     bristle_time_s: float
 
     def level(self, speed: float) -> float:
-        """Deflection at which the bristles slip."""
+        """Return the deflection at which the bristles slip."""
         hump = np.exp(-((speed / self.stribeck_speed_rad_s) ** 2))
         return float(1 + (self.static_ratio - 1) * hump)
 
@@ -37,7 +37,7 @@ class Lugre:
 
 
 def slope(x: Array, command: float, friction: Lugre) -> Array:
-    """Rate of ``[phi, q, phi', q', z]``."""
+    """Return the rate of ``[phi, q, phi', q', z]``."""
     phi, q, w, v, z = x
     gear = STIFFNESS * (RATIO * phi - q) + DAMPING * (RATIO * w - v)
     motor = command - VISCOUS * w - friction.torque(w, z) - RATIO * gear
@@ -65,7 +65,7 @@ def jacobian(x: Array, friction: Lugre) -> Array:
 
 
 def closed_loop(reference: Array, friction: Lugre, tolerance: float) -> tuple[Array, Array]:
-    """States (n, 5) and commands (n,) by SciPy's Radau, restarted at every sample."""
+    """Return states (n, 5) and commands (n,) by SciPy's Radau, restarted at every sample."""
     x, states, commands = np.zeros(5), [], []
     angle, previous = 0.0, None
     # Typical sizes of the states.

@@ -1,4 +1,4 @@
-"""MCAP files that tests write with its own library: messages in JSON, protobuf and CDR."""
+"""MCAP files for tests, written by the format's own library: messages in JSON, protobuf and CDR."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _TYPES = descriptor_pb2.FieldDescriptorProto
 
 
 def stamp(time_s: float) -> dict[str, int]:
-    """Return a time as Foxglove has it in JSON."""
+    """Return a time in Foxglove's JSON form."""
     seconds, rest = divmod(START_NS + round(time_s * 1e9), 1_000_000_000)
     return {"sec": seconds, "nsec": rest}
 
@@ -35,7 +35,10 @@ def written_json(
     encoding: str = "json",
     late_ns: int = 300_000,
 ) -> Path:
-    """Write messages of topics with the times of their recording less ``late_ns`` [s]; texts and bytes as they are."""
+    """Write messages of topics, each (time [s], message), as recorded ``late_ns`` later.
+
+    Texts and bytes are written unchanged.
+    """
     with path.open("wb") as file:
         writer = McapWriter(file)
         writer.start(profile="", library="test")
@@ -60,7 +63,7 @@ def _field(name: str, number: int, kind: int, *, many: bool = False, of: str = "
 
 
 def protobuf_types() -> dict[str, Any]:
-    """Return classes by name: foxglove.JointStates as its page has it, and flat arrays by joint."""
+    """Return classes by name: foxglove.JointStates by its documentation, and flat arrays by joint."""
     file = descriptor_pb2.FileDescriptorProto(
         name="states.proto",
         package="foxglove",
@@ -101,7 +104,7 @@ def written_protobuf(path: Path, topic: str, messages: Iterable[tuple[float, Any
     return path
 
 
-# sensor_msgs/msg/JointState as ROS 2 generates it from its messages.
+# sensor_msgs/msg/JointState as ROS 2 generates it.
 JOINT_STATE_IDL = """\
 module builtin_interfaces { module msg {
   struct Time { int32 sec; uint32 nanosec; };
@@ -123,7 +126,7 @@ module sensor_msgs { module msg {
 
 @dataclass(frozen=True)
 class Definition:
-    """What stands of a type beside its messages, by what is other than in a recording of ROS 2."""
+    """Changes to a type's stored definition in an MCAP file; None keeps what ROS 2 records."""
 
     name: str | None = None
     encoding: str | None = None
@@ -139,9 +142,9 @@ def not_of_ros(
     beside: Mapping[str, Iterable[tuple[float, Any]]] | None = None,
     spoiled: Mapping[int, bytes] | None = None,
 ) -> Path:
-    """Write the MCAP file of a recording of ROS 2 as others write it, with JSON topics ``beside``.
+    """Write the MCAP file of a ROS 2 recording in another program's form, with JSON topics ``beside``.
 
-    ``spoiled``: other bytes of messages, by their number.
+    ``spoiled``: replacement bytes of messages, by message number.
     """
     with recording.open("rb") as source, path.open("wb") as file:
         writer = McapWriter(file)

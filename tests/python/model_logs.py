@@ -1,4 +1,4 @@
-"""Logs of arms whose model files tests diagnose: sines on all joints, torque by inverse dynamics."""
+"""Logs of arms with model files: sines on all joints, torque by inverse dynamics."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from import_data import URDF, written
 
 Array = NDArray[np.float64]
 STEP_S = 0.01
-# Added torque [Nm] of angle and speed [rad, rad/s], (n, n_axes), motor side.
+# Added torque [Nm] as a function of angle and speed [rad, rad/s], (n, n_axes), motor side.
 Added = Callable[[Array, Array], Array]
 
 
 def sines(run: int, n_axes: int, n: int = 1500) -> tuple[Array, Array, Array]:
-    """Return angle, speed and acceleration (n, n_axes), another motion in every run."""
+    """Return angle, speed and acceleration (n, n_axes); every run has another motion."""
     t = STEP_S * np.arange(n)[:, None]
     axis = np.arange(n_axes)
     waves = [(0.6, 1.1 + 0.2 * run, 0.3), (0.4, 2.3, 1.0 + run)]
@@ -32,7 +32,7 @@ def sines(run: int, n_axes: int, n: int = 1500) -> tuple[Array, Array, Array]:
 
 
 def written_log(folder: Path, run: int, machine: Robot, added: Added, noise: float = 0.02) -> Path:
-    """Write the log of a rigid machine without gears, ``noise`` [Nm] on its torque."""
+    """Write the log of a rigid machine without gears, with ``noise`` [Nm] on its torque."""
     random = np.random.default_rng(run)
     q, v, a = sines(run, machine.n_axes)
     torque = machine.inverse_dynamics(q, v, a) + added(q, v)

@@ -25,7 +25,7 @@ RIPPLE = mc.EffectEntry(
 
 
 def small_study(**changes) -> mc.Study:
-    """Half-second periods at 2 kHz, 19 lines, blocks of 8 runs: about 5 ms per run."""
+    """Return a study with half-second periods at 2 kHz, 19 lines, blocks of 8 runs: about 5 ms per run."""
     fields = {
         "robot": ROBOT,
         "runs": 40,
@@ -41,7 +41,7 @@ def small_study(**changes) -> mc.Study:
 
 
 def robot_file(folder: Path, old: str, new: str) -> str:
-    """The preset robot with a piece of its text replaced, as a file."""
+    """Return the path of the preset robot's file with a piece of its text replaced."""
     text = load_robot(ROBOT).toml
     assert old in text
     path = folder / "robot.toml"
@@ -50,7 +50,7 @@ def robot_file(folder: Path, old: str, new: str) -> str:
 
 
 def same_bits(a: xr.Dataset, b: xr.Dataset) -> None:
-    """Every variable of both has the same bytes."""
+    """Assert that every variable has the same bytes in both."""
     assert set(a.variables) == set(b.variables)
     for name in a.variables:
         assert a[name].dtype == b[name].dtype, name
@@ -58,12 +58,12 @@ def same_bits(a: xr.Dataset, b: xr.Dataset) -> None:
 
 
 def blocks(out: Path) -> list[Path]:
-    """Finished blocks of a store."""
+    """Return the finished blocks of a store."""
     return sorted((out / "study.zarr" / "blocks").glob("*-*"))
 
 
 def start(*command: str, **options) -> subprocess.Popen:
-    """A Python process in a group of its own."""
+    """Return a Python process in its own process group."""
     return subprocess.Popen(
         [sys.executable, *command],
         start_new_session=True,
@@ -73,14 +73,14 @@ def start(*command: str, **options) -> subprocess.Popen:
 
 
 def kill(process: subprocess.Popen) -> None:
-    """SIGKILL, as nothing else stops a process without a chance to tidy up."""
+    """Send SIGKILL, because every other signal lets a process tidy up."""
     if process.poll() is None:
         process.send_signal(signal.SIGKILL)
     process.wait(timeout=10)
 
 
 def until(condition, seconds: float = 30.0) -> None:
-    """Wait for a condition, or fail."""
+    """Wait for a condition, or fail after ``seconds``."""
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "timed out"
@@ -88,7 +88,7 @@ def until(condition, seconds: float = 30.0) -> None:
 
 
 def relative(got, want) -> float:
-    """Largest difference over the largest value."""
+    """Return the largest difference over the largest value."""
     return float(np.max(np.abs(got - want)) / np.max(np.abs(want)))
 
 
@@ -96,7 +96,7 @@ def relative(got, want) -> float:
 def dask_cluster(
     folder: Path,
 ) -> Iterator[tuple[str, subprocess.Popen[bytes], list[subprocess.Popen[bytes]]]]:
-    """Address of a scheduler on loopback, its process, and two worker processes without nannies."""
+    """Yield a scheduler's loopback address, its process, and two worker processes without nannies."""
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     contact = folder / "scheduler.json"
     host = ["--host", "127.0.0.1", "--no-dashboard"]

@@ -1,8 +1,8 @@
 """The robots of this project as MuJoCo models (MJCF), built from the TOML text alone.
 
-Hinges with springs and dampers for the joints, and one rotor per motor, coupled to its
-joint by a tendon of length ``r phi - q``: the same states and the same equations. The
-rotors' bodies stand on the base, so rotor gyroscopics are absent here too.
+Hinges with springs and dampers stand for the joints. Each motor has a rotor, which a tendon of length ``r phi
+- q`` couples to its joint: the same states and equations. The rotors' bodies stand on the base, so rotor
+gyroscopics are absent here too.
 """
 
 import tomllib
@@ -10,12 +10,12 @@ from collections.abc import Sequence
 
 
 def vector(x: Sequence[float]) -> str:
-    """Numbers for an XML attribute."""
+    """Return numbers as an XML attribute."""
     return " ".join(repr(float(v)) for v in x)
 
 
 def build(text: str, integrator: str, timestep: float) -> str:
-    """MJCF of the robot; positions are motor angles, then joint angles."""
+    """Return the MJCF of a robot; positions are motor angles, then joint angles."""
     data = tomllib.loads(text)
     bodies, close, rotors, tendons, motors = "", "", "", "", ""
     for joint in data["joint"]:
@@ -32,7 +32,7 @@ def build(text: str, integrator: str, timestep: float) -> str:
                 f' fullinertia="{vector(link["inertia"])}"/>'
             )
         else:
-            # MuJoCo wants mass in every moving body; this much changes nothing visible.
+            # MuJoCo refuses a moving body without mass; this mass is too small to show.
             bodies += '<inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/>'
         close += "</body>"
         if elastic:

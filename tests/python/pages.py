@@ -1,11 +1,11 @@
-"""What pages hold, as a browser reads it: elements, texts of styles and scripts, the content policy."""
+"""Contents of a page as a browser reads them: elements, styles and scripts, the content policy."""
 
 import base64
 import hashlib
 import re
 from html.parser import HTMLParser
 
-# Whatever makes a browser fetch, go or run something.
+# Everything that makes a browser fetch, navigate or run something.
 _REACHING = {
     "src",
     "srcset",
@@ -20,7 +20,7 @@ _REACHING = {
 
 
 class Page(HTMLParser):
-    """``elements``: name and attributes, in order; ``own``: texts of each style and script."""
+    """A parsed page. ``elements``: name and attributes in order; ``own``: text of each style and script."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -44,12 +44,12 @@ class Page(HTMLParser):
 
     @property
     def structure(self) -> list[tuple[str, tuple[str, ...]]]:
-        """Elements and names of attributes: what no text may change."""
+        """Return elements and attribute names: no text may change these."""
         return [(tag, tuple(attributes)) for tag, attributes in self.elements]
 
     @property
     def policy(self) -> dict[str, str]:
-        """The content policy, by directive; the page must state one, first thing after its encoding."""
+        """Return the content policy by directive; it must come right after the page's encoding."""
         metas = [a for tag, a in self.elements if tag == "meta" and "http-equiv" in a]
         assert [a["http-equiv"] for a in metas] == ["Content-Security-Policy"]
         rules = (metas[0]["content"] or "").split("; ")
@@ -57,12 +57,12 @@ class Page(HTMLParser):
 
 
 def digest(text: str) -> str:
-    """The hash of a style or script as a policy names it."""
+    """Return the hash of a style or script in the form of a policy."""
     return "'sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() + "'"
 
 
 def assert_strict(text: str) -> None:
-    """Nothing is fetched, and nothing is run but the page's one style and at most one script."""
+    """Assert that a page fetches nothing and runs only its one style and at most one script."""
     assert "://" not in text
     page = Page(text)
     policy = page.policy

@@ -1,7 +1,7 @@
 """The robots of this project as Pinocchio models, built from the TOML text alone.
 
-Written from the file format's specification and from nothing of the package, so
-that agreement with the core means something.
+This module follows the file format's specification and uses nothing of the package, so that agreement with
+the core means something.
 """
 
 import tomllib
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 def build(text: str) -> pin.Model:
-    """Chain of all joints; frame of joint ``i`` is parallel to its parent's at zero angle."""
+    """Return the chain of all joints; the frame of joint ``i`` is parallel to its parent's at zero angle."""
     data: dict[str, Any] = tomllib.loads(text)
     model = pin.Model()
     model.gravity = pin.Motion(np.array(data["gravity"]), np.zeros(3))
@@ -38,13 +38,13 @@ def build(text: str) -> pin.Model:
 
 
 def inertia_matrix(model: pin.Model, data: pin.Data, q: Array) -> Array:
-    """Full symmetric inertia matrix (older versions fill the upper triangle only)."""
+    """Return the full symmetric inertia matrix; older versions fill the upper triangle only."""
     upper = np.triu(np.array(pin.crba(model, data, q)))
     return upper + np.triu(upper, 1).T
 
 
 def point_jacobian(model: pin.Model, data: pin.Data, q: Array, joint: int, point: Array) -> Array:
-    """Linear then angular velocity of a point of link ``joint`` (0-based), base axes."""
+    """Return linear, then angular velocity of a point of link ``joint`` (from 0), base axes."""
     frame = pin.Frame("point", joint + 1, pin.SE3(np.eye(3), point), pin.FrameType.OP_FRAME)
     extended = model.copy()
     number = extended.addFrame(frame)

@@ -1,4 +1,4 @@
-"""Reading files in child processes, so that one that kills, hangs or swells its reader is seen."""
+"""Reading of files in child processes, which shows crashes, hangs and memory growth."""
 
 import json
 import os
@@ -6,8 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-# Reads every path it is given on its standard input, one line of outcome each: what the exception was,
-# and the largest memory so far (MB).
+# Reads every path on its standard input. Each gives one line: the exception, and the peak memory so far (MB).
 _CHILD = """
 import json, resource, signal, sys, warnings
 from pathlib import Path
@@ -53,12 +52,11 @@ def read_in_child(
     limit: int = 4 * 10**9,
     seconds: int = 20,
 ) -> list[tuple[str, float]]:
-    """What reading each file came to, and the child's largest memory until then (MB).
+    """Return the outcome of each file, and the child's peak memory until then (MB).
 
-    As a log, or by a reader of `every_reader`.
-
-    "read", "refused: ..." for an error of the package, another exception by its name, or "killed: ..."
-    by a signal: 11 where memory was violated, 14 where it took longer than `seconds`.
+    Files are read as logs, or by a ``reader`` of `every_reader`. Outcomes: "read", "refused: ..." for an
+    error of the package, the name of another exception, or "killed: ..." with the signal: 11 for a memory
+    violation, 14 after `seconds`.
     """
     found: list[tuple[str, float]] = []
     while len(found) < len(paths):
@@ -81,5 +79,5 @@ def read_in_child(
 
 
 def wrong(outcomes: list[tuple[str, float]]) -> list[str]:
-    """Outcomes that are neither a log nor an error of the package."""
+    """Return the outcomes that are neither a log nor an error of the package."""
     return [said for said, _ in outcomes if said != "read" and not said.startswith("refused: ")]

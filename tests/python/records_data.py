@@ -1,4 +1,4 @@
-"""Signals for the tests of records: multisines, noise of a seed, a lightly damped mode."""
+"""Signals for the tests of records: multisines, seeded noise, a lightly damped mode."""
 
 import numpy as np
 from scipy.signal import cont2discrete, dlsim, dlti
@@ -9,7 +9,7 @@ SAMPLE_TIME_S = 1e-3
 
 
 def multisine(n, lines, seed=0, amplitude=1.0):
-    """One period (n,) with random phases; RMS sqrt(len(lines) / 2) times the amplitude."""
+    """Return one period (n,) with random phases; its rms is sqrt(len(lines) / 2) times the amplitude."""
     spectrum = np.zeros(n // 2 + 1, complex)
     phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
     spectrum[np.asarray(lines)] = amplitude * n / 2 * np.exp(1j * phases)
@@ -17,7 +17,7 @@ def multisine(n, lines, seed=0, amplitude=1.0):
 
 
 def late(x, samples, lines):
-    """One period later by a fraction of samples, from its definition as a sum of sines."""
+    """Return one period later by a fraction of samples, by its definition as a sum of sines."""
     n = len(x)
     spectrum = np.fft.rfft(x)
     t = np.arange(n) - samples
@@ -27,7 +27,7 @@ def late(x, samples, lines):
 
 
 def mode(frequency_hz=20.0, damping=0.02):
-    """A second-order mode, discretized with a zero-order hold."""
+    """Return a second-order mode, discretized with a zero-order hold."""
     w = 2 * np.pi * frequency_hz
     continuous = [
         np.array(m, float) for m in ([[0, 1], [-w * w, -2 * damping * w]], [[0], [w * w]])
@@ -39,7 +39,7 @@ def mode(frequency_hz=20.0, damping=0.02):
 
 
 def experiment(n=1000, n_periods=8, lines=None, noise=0.0, seed=0, system=None):
-    """Input and reference repeat from sample 0, the system starts at rest."""
+    """Return an experiment: input and reference repeat from sample 0, the system starts at rest."""
     lines = np.arange(2, 100) if lines is None else lines
     u = np.tile(multisine(n, lines, seed), n_periods)
     y = dlsim(system or mode(), u)[1][:, 0]

@@ -8,7 +8,7 @@ import numpy as np
 from axisight import Log, Robot
 
 RATE_HZ = 100.0
-# Of a 10 kg class cobot: joint axes and offsets, link masses, motors seen through the gear.
+# A 10 kg class cobot: joint axes and offsets, link masses, motor inertias joint side.
 AXES = ((0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0))
 ORIGINS = ((0, 0, 0.1), (0, 0, 0.1), (0, 0, 0.6), (0.3, 0, 0.05), (0.3, 0, 0), (0.1, 0, 0))
 MASSES = (8.0, 12.0, 8.0, 3.0, 2.0, 1.0)
@@ -48,17 +48,17 @@ def arm_toml() -> str:
 
 
 def motor_inertia(mass_kg: float) -> float:
-    """Return a motor's inertia behind its gear, about that of its link [kg m^2]."""
+    """Return a motor's inertia behind its gear, similar to that of its link [kg m^2]."""
     return 0.08 * mass_kg
 
 
 def arm() -> Robot:
-    """Return the arm as its rigid simulator has it."""
+    """Return the arm as its rigid simulator."""
     return Robot.from_toml(arm_toml())
 
 
 def motion(seed: int, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return angles, speeds and accelerations (n, 6): a few harmonics, as identification uses."""
+    """Return angles, speeds and accelerations (n, 6): a few harmonics, as in identification."""
     time = np.arange(int(seconds * RATE_HZ)) / RATE_HZ
     rng = np.random.default_rng(seed)
     out = np.zeros((3, len(time), 6))
@@ -74,7 +74,7 @@ def motion(seed: int, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarra
 def friction_torque(
     speed: np.ndarray, coulomb: np.ndarray, viscous: np.ndarray, corner_rad_s: float = 0.002
 ) -> np.ndarray:
-    """Return Coulomb and viscous friction (n, 6) [Nm], its corner not the library's formula."""
+    """Return Coulomb and viscous friction (n, 6) [Nm]; its corner differs from the library's formula."""
     return coulomb * speed / np.sqrt(speed**2 + corner_rad_s**2) + viscous * speed
 
 
@@ -85,7 +85,7 @@ def log_of(
     viscous: Sequence[float] = VISCOUS,
     seconds: float = 40.0,
 ) -> Log:
-    """Return a log of a machine like ``robot`` that has friction, noise added."""
+    """Return a log of a machine like ``robot`` with friction and noise."""
     position, speed, acceleration = motion(seed, seconds)
     rotors = np.array([motor_inertia(mass) for mass in MASSES])
     torque = robot.inverse_dynamics(position, speed, acceleration) + rotors * acceleration

@@ -20,7 +20,7 @@ def robot_of(text: str) -> Robot:
 
 
 def random_inertia(rng: np.random.Generator, size: float) -> list[float]:
-    """Of a cloud of points, so that it is one a body can have."""
+    """Return the inertia of a cloud of points, which is always possible."""
     points = rng.normal(0, size, (12, 3))
     points -= points.mean(axis=0)
     second = points.T @ points
@@ -30,7 +30,7 @@ def random_inertia(rng: np.random.Generator, size: float) -> list[float]:
 
 
 def random_chain(seed: int, n_joints: int = 6, elastic: bool = True) -> str:
-    """Revolute and prismatic, driven and elastic joints on any axes, some links massless."""
+    """Return revolute and prismatic, driven and elastic joints on any axes, some without link mass."""
     rng = np.random.default_rng(seed)
     joints: list[dict[str, Any]] = []
     for i in range(n_joints):
@@ -66,7 +66,7 @@ def random_chain(seed: int, n_joints: int = 6, elastic: bool = True) -> str:
 
 
 def description(joints: list[dict[str, Any]], gravity: list[float]) -> str:
-    """The text of a robot with these joints."""
+    """Return the text of a robot with these joints."""
     driven = sum(joint["kind"] == "driven" for joint in joints)
     return tomli_w.dumps(
         {
@@ -83,7 +83,7 @@ def description(joints: list[dict[str, Any]], gravity: list[float]) -> str:
 
 
 def wrist_arm() -> str:
-    """Six axes in the usual arrangement: waist, shoulder, elbow, wrist of three."""
+    """Return six axes in the usual arrangement: waist, shoulder, elbow, three wrist axes."""
     rng = np.random.default_rng(7)
     places = [
         ([0.0, 0.0, 0.4], [0.0, 0.0, 1.0], 250.0, 1 / 120),
@@ -116,7 +116,7 @@ def wrist_arm() -> str:
 
 
 def motion(robot: Robot, n: int, seed: int = 0) -> tuple[Array, Array, Array]:
-    """Independent random positions, velocities and accelerations."""
+    """Return independent random positions, velocities and accelerations."""
     rng = np.random.default_rng(seed)
     shape = (n, robot.n_joints)
     return rng.uniform(-np.pi, np.pi, shape), rng.normal(0, 2, shape), rng.normal(0, 5, shape)
@@ -127,7 +127,7 @@ def parse(text: str) -> dict[str, Any]:
 
 
 def smooth_motion(robot: Robot, n: int, step_s: float, seed: int = 0) -> tuple[Array, Array, Array]:
-    """Sums of five sines per joint, with exact derivatives."""
+    """Return sums of five sines per joint, with exact derivatives."""
     rng = np.random.default_rng(seed)
     t = step_s * np.arange(n)[:, None, None]
     shape = (robot.n_joints, 5)
@@ -141,13 +141,13 @@ def smooth_motion(robot: Robot, n: int, step_s: float, seed: int = 0) -> tuple[A
 
 
 def three_axes() -> str:
-    """The first three axes of the arm."""
+    """Return the first three axes of the arm."""
     data = parse(wrist_arm())
     return description(data["joint"][:3], data["gravity"])
 
 
 def drive_values(names: list[str], nominal: Array) -> Array:
-    """Nominal parameters with friction and offsets that a robot file does not hold."""
+    """Return nominal parameters plus friction and offsets that a robot file does not hold."""
     values = nominal.copy()
     for i, name in enumerate(names):
         if name.endswith("coulomb_friction"):

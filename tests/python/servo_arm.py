@@ -1,4 +1,4 @@
-"""An arm of three joints whose actuators are told positions, simulated by MuJoCo."""
+"""A three-joint arm whose actuators get position targets, simulated by MuJoCo."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 RATE_HZ = 50.0
 SECONDS = 20.0
-# Of an encoder of fifteen bits.
+# Of a 15-bit encoder.
 NOISE_RAD = 2e-4
 HOME_RAD = np.array([0.0, 0.5, 0.9])
 REACH_RAD = np.array([0.35, 0.22, 0.3])
@@ -26,7 +26,10 @@ SETTLED_S = 4.0
 
 @dataclass(frozen=True)
 class ServoArm:
-    """What differs between machines: SI units, joint side; ``limit`` of torque, 0 is none; ``late_s`` of targets."""
+    """Parameters of a machine, SI units, joint side.
+
+    ``limit`` of torque: 0 for none. ``late_s``: delay of targets.
+    """
 
     damping: tuple[float, float, float] = (3.0, 2.0, 0.6)
     dry_friction: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -41,18 +44,18 @@ class ServoArm:
     integrator: str = "implicitfast"
 
     def with_changed(self, field: str, joint: int, value: float) -> ServoArm:
-        """Return the arm with another value of one joint, from 1."""
+        """Return the arm with another value of one joint (from 1)."""
         values = list(getattr(self, field))
         values[joint - 1] = value
         return replace(self, **{field: tuple(values)})
 
     def weaker(self, joint: int, factor: float) -> ServoArm:
-        """Return the arm with both gains of a joint times a factor."""
+        """Return the arm with both gains of a joint (from 1) multiplied by a factor."""
         out = self.with_changed("kp", joint, self.kp[joint - 1] * factor)
         return out.with_changed("kd", joint, self.kd[joint - 1] * factor)
 
     def mjcf(self) -> str:
-        """Return the model."""
+        """Return the MuJoCo model (MJCF)."""
 
         def joint(i: int, axis: str) -> str:
             return (
@@ -97,7 +100,7 @@ class ServoArm:
         home_rad: Array = HOME_RAD,
         speed_noise_rad_s: float | None = None,
     ) -> Log:
-        """Return targets and positions of one run, from where the arm has settled; speeds where they have noise."""
+        """Return targets and positions of one run from the settled arm; also speeds if these have noise."""
         import mujoco  # noqa: PLC0415 - an extra
 
         wanted = targets(run, home_rad, self.rate_hz)
@@ -118,7 +121,7 @@ class ServoArm:
 
 
 def moved(model: Any, wanted: Array, rate_hz: float, late_s: float = 0.0) -> tuple[Array, Array]:
-    """Return angles and speeds (n, 3) of a MuJoCo model that is told targets (n, 3), from where it has settled."""
+    """Return angles and speeds (n, 3) of a settled MuJoCo model under targets (n, 3)."""
     import mujoco  # noqa: PLC0415 - an extra
 
     data, step_s = mujoco.MjData(model), model.opt.timestep
@@ -136,7 +139,7 @@ def moved(model: Any, wanted: Array, rate_hz: float, late_s: float = 0.0) -> tup
 
 
 def targets(run: int, home_rad: Array = HOME_RAD, rate_hz: float = RATE_HZ) -> Array:
-    """Return sums of sines up to 2.2 Hz (n, 3) [rad] that begin and end at home."""
+    """Return sums of sines up to 2.2 Hz (n, 3) [rad] that start and end at home."""
     rng = np.random.default_rng(run)
     t = np.arange(round(SECONDS * rate_hz)) / rate_hz
     fade = np.clip(t / 2, 0, 1) * np.clip(t[-1] - t, 0, 1)
@@ -150,7 +153,7 @@ def targets(run: int, home_rad: Array = HOME_RAD, rate_hz: float = RATE_HZ) -> A
 
 
 def simulator(folder: Path, arm: ServoArm | None = None) -> Robot:
-    """Return the robot of the MJCF of an arm, for logs of its rate."""
+    """Return the robot of an arm's MJCF, for logs at its rate."""
     path, own = folder / "arm.xml", arm or ServoArm()
     path.write_text(own.mjcf(), "utf-8")
     return load_robot(path, sample_time_s=1 / own.rate_hz)
@@ -169,17 +172,18 @@ MACHINES: Mapping[str, ServoArm] = {
     "torque_constant@2": NOMINAL.weaker(2, 0.85),
     "controller_gain@3": NOMINAL.with_changed("kp", 3, 420.0),
 }
-"""By what the simulator lacks of them."""
+"""Machines by what the simulator lacks."""
 
 
 def check_unknown_gains(found: Diagnosis, lacks: str | None, changes: Mapping[str, float]) -> None:
-    """Gains with a tolerance are found by name, as relative changes, and are no cause: dry friction is."""
+    """Assert that gains with a tolerance are found as relative changes, and only dry friction as a cause."""
     assert found.verdict == ("none" if lacks is None else "explained")
     assert [c.label for c in found.causes] == ([lacks] if lacks else [])
     for cause in found.causes:
-        # A tenth, as of gains that are known: the corner of the fitted friction is not MuJoCo's.
+        # 10 %, as with known gains: the corner of the fitted friction differs from MuJoCo's.
         assert np.isclose(cause.parameters["coulomb_nm"].value, 2.5, rtol=0.1)
-    # Gains, masses and friction times one number are the same motion: known as masses are, 1.5 % each.
+    # A common factor on gains, masses and friction leaves the motion the same, so gains are known as well as
+    # masses are: 1.5 % each.
     for name, change in changes.items():
         assert np.isclose(1 + found.refit[name].value, 1 + change, rtol=0.03)
         assert found.refit[name].low < change < found.refit[name].high

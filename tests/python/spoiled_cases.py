@@ -1,4 +1,4 @@
-"""Clean cases, the table of mistakes that spoil them, and what mistakes are made of."""
+"""Clean cases, the table of mistakes that spoil them, and the parts of mistakes."""
 
 from __future__ import annotations
 
@@ -28,11 +28,8 @@ class Case:
         return (*self.estimation, *self.validation)
 
 
-# Clean cases.
-
-
 def references(kind: str, seed: int, n: int, step_s: float) -> np.ndarray:
-    """Motor speeds (n, 3) [rad/s]: a multisine on a square wave, or moves out and back."""
+    """Return motor speeds (n, 3) [rad/s]: a multisine on a square wave, or moves out and back."""
     time = np.arange(n) * step_s
     rng = np.random.default_rng(seed)
     if kind == "moves":
@@ -61,7 +58,7 @@ def references(kind: str, seed: int, n: int, step_s: float) -> np.ndarray:
 
 
 def scattered(robot: Robot, seed: int) -> Robot:
-    """Return a machine of the type: about one per cent off in everything."""
+    """Return a machine of the type, with about 1 % scatter in every parameter."""
     spread = {"mass": 0.01, "stiffness": 0.01, "damping": 0.05, "motor_inertia": 0.01}
     rng = np.random.default_rng(seed)
     return robot.with_parameters(
@@ -74,7 +71,7 @@ def scattered(robot: Robot, seed: int) -> Robot:
 
 
 def loop_case(effects: tuple[Effect, ...] = (), seed: int = 1) -> Case:
-    """Return a closed-loop case of the three-axis elastic robot, effects withheld."""
+    """Return a closed-loop case of the three-axis elastic robot; the simulator lacks ``effects``."""
     robot = load_robot("irb6600_like")
     machine = scattered(robot, seed)
     logs = []
@@ -85,7 +82,7 @@ def loop_case(effects: tuple[Effect, ...] = (), seed: int = 1) -> Case:
         assert out.attrs["status"] == "completed"
         torque = out.torque_cmd_nm.values
         limits = [e for e in effects if e.name == "torque_saturation"]
-        for effect in limits:  # as drives report it, after their limit
+        for effect in limits:  # drives report torque after their limit
             limit = effect.parameters["limit_nm"]
             torque[:, effect.axis - 1] = np.clip(torque[:, effect.axis - 1], -limit, limit)
         logs.append(
@@ -103,7 +100,7 @@ def loop_case(effects: tuple[Effect, ...] = (), seed: int = 1) -> Case:
 
 
 def arm_case() -> Case:
-    """Return a case of the rigid six-axis arm: no controller, friction missing from the simulator."""
+    """Return a case of the rigid six-axis arm: no controller, and no friction in the simulator."""
     logs = [log_of(arm(), seed, seconds=20.0) for seed in range(3)]
     return Case(arm(), tuple(logs[:2]), tuple(logs[2:]))
 
@@ -111,14 +108,12 @@ def arm_case() -> Case:
 clean_loop = functools.cache(loop_case)
 clean_arm = functools.cache(arm_case)
 
-# Mistakes.
-
 
 @dataclass(frozen=True)
 class Mistake:
     spoil: Callable
     name: str
-    """What it must be called."""
+    """The name that the gate must give it."""
     severity: str
     axis: int | None
     kind: str
@@ -153,7 +148,7 @@ def first(case: Case, change: Callable[[Log], Log]) -> Case:
 
 
 def channel(log: Log, field: str, axis: int | None, change: Callable) -> Log:
-    """Return the log with a channel of an axis (from 0; None: all) changed."""
+    """Return the log with one channel of an axis (from 0; None: all axes) changed."""
     values = np.array(getattr(log, field))
     columns = range(values.shape[1]) if axis is None else [axis]
     for i in columns:
@@ -170,7 +165,7 @@ def one(case: Case, field: str, axis: int | None, change: Callable) -> Case:
 
 
 def rows(log: Log, index: np.ndarray) -> Log:
-    """Return the log with rows picked, stamped evenly."""
+    """Return the log with the picked rows, stamped evenly."""
     fields = ("position_rad", "torque_nm", "velocity_ref_rad_s", "velocity_rad_s")
     picked = {f: getattr(log, f)[index] for f in fields if getattr(log, f) is not None}
     return replace(log, time_s=np.arange(len(index)) * log.sample_time_s, **picked)
@@ -182,7 +177,7 @@ def swapped(field: str) -> Callable[[Log], Log]:
 
 
 def late(log: Log, samples: int, axis: int | None, *fields: str) -> Log:
-    """Return the log with channels of an axis (None: all) that show what was ``samples`` earlier."""
+    """Return the log with channels of an axis (None: all axes) late by ``samples``."""
     on_time = rows(log, np.arange(samples, log.n_samples))
     behind = rows(log, np.arange(log.n_samples - samples))
     for field in fields:
@@ -194,7 +189,7 @@ def late(log: Log, samples: int, axis: int | None, *fields: str) -> Log:
 
 
 def busy(log: Log, seconds: float = 0.2) -> tuple[int, int]:
-    """Return a stretch in which axis 2 moves fast."""
+    """Return the start and end of a stretch in which axis 2 moves fast."""
     n = round(seconds / log.sample_time_s)
     speed = np.abs(np.gradient(log.position_rad[:, 1]))
     mean = np.convolve(speed, np.ones(n), "valid")

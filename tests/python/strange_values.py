@@ -1,7 +1,7 @@
-"""Feeds every argument of a function with values it was not made for.
+"""Calls of functions with values that they were not made for, one argument at a time.
 
-What may come out is an AxisightError, or a result without an infinite number; a NaN only where
-a flag or the documentation of the field says so.
+The outcome must be an AxisightError, or a result without infinite numbers. A NaN is allowed only if a flag or
+the documentation of the field explains it.
 """
 
 import dataclasses
@@ -67,7 +67,7 @@ MAY_BE_NAN = {
 
 
 def check(result: Any, may_be_nan: frozenset[str] = frozenset(), name: str = "result") -> None:
-    """Fail on an infinite number anywhere, and on a NaN that nothing explains."""
+    """Fail on any infinite number, and on a NaN that nothing explains."""
     if isinstance(result, xr.Dataset):
         lost = result["flag"].values != 0 if "flag" in result else None
         for key, values in result.data_vars.items():
@@ -108,7 +108,7 @@ def feed(
     may_be_nan: frozenset[str] = frozenset(),
     leave_out: frozenset[str] = frozenset(),
 ) -> list[str]:
-    """Call with every argument replaced by every strange value; return what went wrong."""
+    """Call with every strange value in place of every argument; return the failures."""
     check(function(**good), may_be_nan | {"result"})
     wrong = []
     for argument in good:

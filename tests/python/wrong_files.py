@@ -1,4 +1,4 @@
-"""Plausible mistakes in the files of a case: each a function with the name it must be given."""
+"""Plausible mistakes in the files of a case: each a function with the name of the expected finding."""
 
 from __future__ import annotations
 
@@ -15,11 +15,9 @@ from spoiled_cases import (
     mistake,
 )
 
-# Files.
-
 
 def write_case(case: Case, folder: Path) -> Path:
-    """Write the case as a folder and return it."""
+    """Write the case as a folder and return the folder."""
     toml = ['schema = "axisight.case/1"', 'name = "case"', 'robot = "robot.toml"']
     (folder / "logs").mkdir(parents=True)
     for log in case.logs:

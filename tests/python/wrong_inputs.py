@@ -1,4 +1,4 @@
-"""Plausible mistakes in a simulator and its logs: each a function with the name it must be given."""
+"""Plausible mistakes in a simulator and its logs: each a function with the name of the expected finding."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from axisight import Log, Robot
+from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from rigid_arm import arm, arm_toml
 from spoiled_cases import (
     Case,
@@ -495,6 +496,18 @@ def gravity_upwards_arm(case: Case) -> Case:
 @mistake("gravity_flipped")
 def gravity_upwards(case: Case) -> Case:
     return edited(case, lambda t: each_line(t, "gravity", lambda _: "[0.0, 0.0, 9.81]"))
+
+
+@mistake("torque_without_gravity", kind="arm")
+def torque_of_a_driver_that_takes_gravity_off(case: Case) -> Case:
+    robot = case.robot
+
+    def without(log: Log) -> Log:
+        still = np.zeros_like(log.position_rad)
+        weight = predict(robot.with_effects([]), (log.position_rad, still, still, log.torque_nm))
+        return replace(log, torque_nm=log.torque_nm - weight)
+
+    return each(case, without)
 
 
 @mistake("position_offset", kind="arm", severity="flag", axis=2)

@@ -1,7 +1,8 @@
-"""Robots: reading descriptions, kinematics, dynamics, linearization."""
+"""Robots: reading descriptions, kinematics, dynamics and linearization."""
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module, resources
 from pathlib import Path
@@ -28,40 +29,46 @@ ControllerKind = Literal[
     "pi_velocity", "p_velocity", "cascade", "pd_position", "cascade_position", "none"
 ]
 TOLD_POSITIONS: tuple[ControllerKind, ...] = ("pd_position", "cascade_position")
-"""Controllers whose targets are positions."""
+"""Kinds of controllers whose references are positions."""
 
 
 class Robot:
-    """A robot in the format ``axisight.robot/1`` or ``/2``, effects of its simulator included.
+    """A robot in the format ``axisight.robot/1`` or ``/2``, with the effects of its simulator.
 
     Joint arrays run over all joints, driven and elastic, base to tip; axis
-    arrays over driven joints only. ``q`` [rad or m], ``v``, ``a`` and forces
-    [Nm or N] may have shape (n_joints,) or (n, n_joints).
+    arrays over driven joints only. ``q`` [rad or m], ``v`` [rad/s or m/s], ``a`` [rad/s^2 or m/s^2] and
+    forces [Nm or N] may have shape (n_joints,) or (n, n_joints).
 
-    ``core`` hands the robot to functions of the compiled core; everything that can be known of
-    it is an attribute or a method here. Wherever the robot is simulated, linearized or fitted, its
-    own `effects` act; an effect given to a call takes the place of its own of that name and axis.
+    ``core`` is the robot for functions of the compiled core; users need only the attributes and methods
+    here. The robot's own `effects` act in every simulation, linearization and fit. An effect that is passed
+    to a call replaces the robot's effect of that name and axis.
     """
 
     def __init__(self, core: _core.Robot) -> None:
         self.core = core
         self._torque_constants: tuple[float | None, ...] = (None,) * core.n_axes
+        self._states_pose = True
 
     def _with_core(self, core: _core.Robot) -> Robot:
-        """Return the same with another robot of the compiled core."""
-        return Robot(core).with_torque_constants(self._torque_constants)
+        """Return a robot with another core and what the core does not hold."""
+        out = Robot(core)
+        out._torque_constants = self._torque_constants
+        out._states_pose = self._states_pose
+        return out
 
     @classmethod
     def from_toml(cls, text: str) -> Robot:
-        """Return the robot of a description; raises RobotError naming line, key and expectation."""
-        return cls(_core.Robot.from_toml(text))
+        """Return the robot of a description `text`; raise RobotError naming line, key and expectation."""
+        out = cls(_core.Robot.from_toml(text))
+        out._states_pose = "operating_point" in tomllib.loads(text)
+        return out
 
     def __repr__(self) -> str:
-        """Name and size."""
+        """Return the name and the number of axes and joints."""
         return f"<Robot {self.name!r}: {self.n_axes} axes, {self.n_joints} joints>"
 
     def _repr_html_(self) -> str:
-        """Axes with drives and the present operating point, for notebooks."""
+        """Return the axes with drives and operating point as HTML, for notebooks."""
         kinds = ["slides" if slides else "turns" for slides in self.axis_is_prismatic]
         gears = ["rigid" if rigid else "elastic" for rigid in self.axis_is_rigid]
         ratios, pose = (map(html.number, x) for x in (self.gear_ratio, self.operating_point))
@@ -81,7 +88,7 @@ class Robot:
 
     @property
     def name(self) -> str:
-        """Name in the description."""
+        """Name from the description."""
         return self.core.name
 
     @property
@@ -106,27 +113,27 @@ class Robot:
 
     @property
     def toml(self) -> str:
-        """The description it was read from; parameters and effects replaced since do not show."""
+        """The description as it was read, without parameters and effects that were replaced since."""
         return self.core.toml
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """Effects that its simulator models: those of its description, unless replaced since."""
+        """Effects that the simulator models: those of the description, unless replaced since."""
         return tuple(effect_of_core(effect) for effect in self.core.effects)
 
     @property
     def tolerances(self) -> dict[str, float]:
-        """Relative standard deviation [1] of its own parameters, for quantities that state one.
+        """Tolerances of the own parameters (relative standard deviation [1]) that the description states.
 
-        Quantities are ``mass``, ``inertia_scale``, ``stiffness``, ``damping``, ``motor_inertia``
-        and ``viscous_friction``, of a controller of targets its gains ``kp`` and ``kd``, of a
-        cascade ``kv``, ``kp`` and ``ki``.
+        Quantities are ``mass``, ``inertia_scale``, ``stiffness``, ``damping``, ``motor_inertia`` and
+        ``viscous_friction``. A controller of position targets also has its gains ``kp`` and ``kd``, a cascade
+        ``kv``, ``kp`` and ``ki``.
         """
         return dict(self.core.tolerances)
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """All joints with link, spring and drive, base to tip, at the present parameters."""
+        """All joints with link, spring and drive, base to tip, at the current parameters."""
         return tuple(joint_of(entry) for entry in self.core.joints())
 
     @property
@@ -136,7 +143,7 @@ class Robot:
 
     @property
     def axis_joints(self) -> list[int]:
-        """Place in the chain, from 0, of the joint that each axis drives."""
+        """Index in the chain, from 0, of the joint that each axis drives."""
         return self.core.axis_joints
 
     @property
@@ -146,21 +153,20 @@ class Robot:
         return [names[joint] for joint in self.axis_joints]
 
     def axis_number(self, axis: int | str) -> int:
-        """Return the number of an axis (from 1) that is given by number or by the joint it drives.
+        """Return the number (from 1) of an `axis` that is given by number or by the joint it drives.
 
-        Raises InputError with the joint names and the nearest one.
+        Raises InputError, with the joint names and the nearest one, for an axis that is not there.
         """
         if type(axis) is int and 1 <= axis <= self.n_axes:
             return axis
         return axis_number(axis, self.axis_names)
 
     def axis_parameter(self, axis: int | str, quantity: str) -> str | None:
-        """Return the name of a parameter of an axis: of its joint, or of one that moves with it.
+        """Return the name of a parameter of an axis (``axis1.stiffness``), or None if there is none.
 
-        ``axis`` is a number from 1 or the name of the joint that the axis drives.
-
-        ``quantity`` is that of a joint (``stiffness``) or of a link (``mass``), which may be carried by
-        an elastic joint between the axis and the next. None where there is none.
+        ``axis`` is a number from 1 or the name of the joint that the axis drives. ``quantity`` belongs to a
+        joint (``stiffness``) or to a link (``mass``). The joint is that of the axis, or an elastic joint
+        between this axis and the next. Raises InputError for an axis that is not there.
         """
         axis = self.axis_number(axis)
         places = [*self.axis_joints, self.n_joints]
@@ -171,7 +177,7 @@ class Robot:
 
     @property
     def axis_is_prismatic(self) -> list[bool]:
-        """Whether each axis slides."""
+        """Whether each axis is prismatic."""
         return self.core.axis_is_prismatic
 
     @property
@@ -181,7 +187,7 @@ class Robot:
 
     @property
     def gear_ratio(self) -> Array:
-        """Joint angle per motor angle, shape (n_axes,) [1, m/rad if the axis slides]."""
+        """Joint angle per motor angle, shape (n_axes,) [1, or m/rad on a prismatic axis]."""
         return self.core.gear_ratio
 
     @property
@@ -190,23 +196,31 @@ class Robot:
         return self.core.operating_point
 
     @property
+    def states_operating_point(self) -> bool:
+        """Whether the description states the operating point; without it, all angles there are zero.
+
+        An import puts it into the middle of a joint's range where zero lies outside, and states nothing.
+        """
+        return self._states_pose
+
+    @property
     def position_noise_std(self) -> float:
         """Standard deviation of the white noise on motor positions, per sample [rad]."""
         return self.core.position_noise_std
 
     @property
     def controller_kind(self) -> ControllerKind:
-        """``pi_velocity``, ``p_velocity``, ``cascade``, ``pd_position``, ``cascade_position``, or ``none``."""
+        """Kind of controller: one of the words of `ControllerKind`, ``none`` without a controller."""
         return self.core.controller_kind
 
     @property
     def told_positions(self) -> bool:
-        """Whether the targets of its controller are positions."""
+        """Whether the references of the controller are positions."""
         return self.controller_kind in TOLD_POSITIONS
 
     @property
     def told_speeds(self) -> bool:
-        """Whether the references of its controller are speeds."""
+        """Whether the references of the controller are speeds."""
         return self.controller_kind != "none" and not self.told_positions
 
     @property
@@ -214,26 +228,26 @@ class Robot:
         """Gains by name, shape (n_axes,) each, motor side.
 
         ``kp`` [Nm s/rad] and ``ki`` [Nm/rad]; cascades also have ``kv`` [1/s]. ``pd_position`` has ``kp``
-        [Nm/rad] and ``kd`` [Nm s/rad], [1/s^2] and [1/s] of a `computed_torque`.
+        [Nm/rad] and ``kd`` [Nm s/rad]; with `computed_torque` they are in [1/s^2] and [1/s].
         """
         return self.core.controller_gains
 
     @property
     def torque_constants(self) -> tuple[float | None, ...]:
-        """Torque constant of each motor [Nm/A], by which currents in logs are read; None where nobody said it.
+        """Torque constant of each motor [Nm/A], to convert currents in logs; None if it is unknown.
 
-        Model files have them in their drive data. Robot files have no place for them.
+        The drive data of a model file state them; robot files cannot.
         """
         return self._torque_constants
 
     def with_torque_constants(self, nm_per_a: Sequence[float | None]) -> Robot:
-        """Return the same robot with torque constants (n_axes,) [Nm/A], None where one is not known.
+        """Return the same robot with torque constants ``nm_per_a`` (n_axes,) [Nm/A], None for unknown ones.
 
-        Raises InputError for another number of them, or ones that are not positive.
+        Raises InputError for another number of constants, or one that is not positive.
         """
         if len(nm_per_a) != self.n_axes:
             raise InputError(f"nm_per_a: expected {self.n_axes} entries, got {len(nm_per_a)}")
-        out = Robot(self.core)
+        out = self._with_core(self.core)
         out._torque_constants = tuple(
             None if x is None else positive("nm_per_a", x) for x in nm_per_a
         )
@@ -246,7 +260,7 @@ class Robot:
     def with_parameters(self, values: Mapping[str, float]) -> Robot:
         """Return the same robot with some parameters replaced, by name, in SI units.
 
-        Raises InputError for a name that `parameters` does not have, with the nearest one.
+        Raises InputError, with the nearest name, for a name that `parameters` does not have.
         """
         try:
             return self._with_core(self.core.with_parameters(list(values.items())))
@@ -257,58 +271,63 @@ class Robot:
 
     @property
     def velocity_feedforward(self) -> bool:
-        """Whether the rate of the references is the reference of the controller's speed.
+        """Whether a controller of position targets takes the rate of the targets as its speed reference.
 
-        Always so but where targets are positions (`told_positions`) and the file says otherwise, or logs
-        have no references of speed.
+        It is True for every other controller.
         """
         return self.core.velocity_feedforward
 
     @property
     def computed_torque(self) -> bool:
-        """Whether the controller makes accelerations of errors, and torques of these by the robot's dynamics.
+        """Whether the controller computes torques from accelerations by the robot's inverse dynamics.
 
-        It knows the robot as its file states it: effects and parameters that are fitted are the machine's.
+        The controller uses the robot as its file states it. Fitted effects and parameters change the machine
+        only.
         """
         return self.core.computed_torque
 
     @property
     def stepped(self) -> tuple[float, Array] | None:
-        """Steps of the simulator that holds the law of targets; None where it is a machine.
+        """Time step of the simulator that runs the controller, and its added inertia; None for a machine.
 
-        The step [s], from half of which before a target acts, and what the simulator's treatment of damping
-        adds to the inertia of each motor (n_axes,) [kg m^2].
+        A target acts from half a step [s] earlier. The simulator's treatment of damping adds the inertia
+        (n_axes,) [kg m^2] to the motors.
         """
         found = self.core.stepped
         return None if found is None else (found[0], np.array(found[1]))
 
     def with_velocity_feedforward(self, on: bool) -> Robot:
-        """Return the same robot with its speed reference switched on or off.
+        """Return the same robot with `velocity_feedforward` switched on or off.
 
-        Raises InputError unless its targets are positions.
+        Raises InputError unless the references of its controller are positions.
         """
         return self._with_core(self.core.with_velocity_feedforward(on))
 
     def with_operating_point(self, angle_rad: ArrayLike) -> Robot:
-        """Return the same robot at rest at other driven joint angles (n_axes,) [rad or m].
+        """Return the same robot with another operating point ``angle_rad`` (n_axes,) [rad or m].
 
-        Raises InputError for another number of angles, or ones that are not finite.
+        Raises InputError for another number of driven joint angles, or ones that are not finite.
         """
-        return self._with_core(
-            self.core.with_operating_point(np.asarray(angle_rad, float).tolist())
-        )
+        out = self._with_core(self.core.with_operating_point(np.asarray(angle_rad, float).tolist()))
+        out._states_pose = True
+        return out
+
+    def without_stated_pose(self) -> Robot:
+        """Return the same robot with an operating point that nobody stated; see `states_operating_point`."""
+        out = self._with_core(self.core)
+        out._states_pose = False
+        return out
 
     def with_controller_speed(self, factor: float) -> Robot:
-        """Return the same robot with a controller for a loop ``factor`` times as fast as stated.
+        """Return the same robot with a control loop ``factor`` [1] times as fast as stated.
 
-        Gains of speed times the factor, of angle times its square (``kv`` of a cascade times the factor):
-        the shape of the loop stays.
-        Raises InputError unless the factor is positive.
+        The shape of the loop stays: gains on speed grow by the factor, gains on angle by its square, and
+        ``kv`` of a cascade by the factor. Raises InputError unless the factor is positive.
         """
         return self._with_core(self.core.with_controller_speed(factor))
 
     def with_effects(self, effects: Iterable[Effect]) -> Robot:
-        """Return the same robot with ``effects`` in place of all its own; none switch them off.
+        """Return the same robot with ``effects`` in place of all its own; an empty list removes them.
 
         Raises InputError for an effect that the robot cannot have: an axis that is not there, a
         spring in a rigid transmission, parameters outside their bounds.
@@ -318,8 +337,8 @@ class Robot:
     def placed(self, effects: Iterable[Effect]) -> list[Effect]:
         """Return effects with axis numbers in place of joint names.
 
-        Every method and function that takes effects beside a robot does so itself. Raises InputError for
-        what is no effect, and for a name that no driven joint has; the message has the nearest one.
+        Every method and function that takes a robot and effects calls this itself. Raises InputError for
+        an object that is not an effect, and, with the nearest name, for a name that no driven joint has.
         """
         names: list[str] | None = None
         out = []
@@ -344,31 +363,44 @@ class Robot:
         return out, single
 
     def inertia_matrix(self, q: ArrayLike) -> Array:
-        """Return M(q), shape (n_joints, n_joints) or (n, n_joints, n_joints) [kg m^2]."""
+        """Return M(q), shape (n_joints, n_joints) or (n, n_joints, n_joints) [kg m^2].
+
+        Raises InputError for another shape of ``q`` [rad or m].
+        """
         (rows,), single = self._rows(q=q)
         out = self.core.inertia_matrix(rows)
         return out[0] if single else out
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Array:
-        """Return Coriolis, centrifugal and gravity forces c(q, v) + g(q) [Nm]."""
+        """Return Coriolis, centrifugal and gravity forces c(q, v) + g(q) [Nm or N], in the shape of ``q``.
+
+        Raises InputError for other shapes of ``q`` and ``v`` than those of the class.
+        """
         (rows, rates), single = self._rows(q=q, v=v)
         out = self.core.bias(rows, rates)
         return out[0] if single else out
 
     def gravity(self, q: ArrayLike) -> Array:
-        """Return gravity forces g(q) [Nm]."""
+        """Return gravity forces g(q) [Nm or N], in the shape of ``q``; raise InputError for another shape."""
         (rows,), single = self._rows(q=q)
         out = self.core.gravity(rows)
         return out[0] if single else out
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
-        """Return joint forces M(q) a + c(q, v) + g(q) [Nm], without motors and springs."""
+        """Return joint forces M(q) a + c(q, v) + g(q) [Nm or N], without motors and springs.
+
+        The result has the shape of ``q``. Raises InputError for other shapes than those of the class.
+        """
         (rows, rates, accelerations), single = self._rows(q=q, v=v, a=a)
         out = self.core.inverse_dynamics(rows, rates, accelerations)
         return out[0] if single else out
 
     def forward_dynamics(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> Array:
-        """Return joint accelerations [rad/s^2] under joint forces ``tau`` [Nm]."""
+        """Return joint accelerations [rad/s^2 or m/s^2] under joint forces ``tau`` [Nm or N].
+
+        The result has the shape of ``q``, ``v`` and ``tau``. Raises InputError for other shapes than those of
+        the class.
+        """
         (rows, rates, forces), single = self._rows(q=q, v=v, tau=tau)
         out = self.core.forward_dynamics(rows, rates, forces)
         return out[0] if single else out
@@ -376,7 +408,8 @@ class Robot:
     def pose(self, q: ArrayLike, joint: int | str = -1) -> tuple[Array, Array]:
         """Return rotation (3, 3) and origin (3,) [m] of a link frame in the base frame.
 
-        ``joint`` is a joint name or a position in the chain (from 0; -1 is the last).
+        ``q`` (n_joints,) are the joint positions [rad or m]. ``joint`` is a joint name or an index in the
+        chain (from 0; -1 is the last). Raises InputError for another shape and for an unknown joint.
         """
         (rows,), _ = self._rows(q=q)
         return self.core.pose(rows[0].tolist(), self._joint(joint))
@@ -386,7 +419,9 @@ class Robot:
     ) -> Array:
         """Return the Jacobian (6, n_joints) of a point fixed in a link frame.
 
-        Rows: linear velocity, then angular velocity, in the base frame.
+        Rows: linear velocity [m/s], then angular velocity [rad/s], in the base frame, per joint speed.
+        ``point_m`` (3,) [m] is the point in the frame of the link of ``joint``. ``q``, ``joint`` and errors
+        are as in `pose`.
         """
         (rows,), _ = self._rows(q=q)
         x, y, z = (float(c) for c in point_m)
@@ -410,9 +445,9 @@ class Robot:
     ) -> xr.Dataset:
         """Return the static equilibrium with the driven joints at ``joint_angle_rad``.
 
-        Default is the operating point. Variables ``joint_angle_rad`` (joint),
-        ``motor_angle_rad`` (axis), ``motor_torque_nm`` (axis). Raises InputError
-        if the elastic joints do not settle.
+        ``joint_angle_rad`` (n_axes,) [rad or m] is by default the operating point. ``effects`` are added to
+        the robot's own. Variables are ``joint_angle_rad`` (joint), ``motor_angle_rad`` (axis) and
+        ``motor_torque_nm`` (axis). Raises InputError if the elastic joints do not settle.
         """
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
         out = self.core.equilibrium(core_effects(self.placed(effects)), at)
@@ -430,8 +465,9 @@ class Robot:
     ) -> tuple[Array, Array, Array]:
         """Return A, B, C of ``x' = A x + B u``, ``phi = C x`` at rest at an operating point.
 
-        States ``[phi, q, phi', q']``, inputs motor torques [Nm], outputs motor
-        angles [rad]; derivatives are exact (dual numbers).
+        States are ``[phi, q, phi', q']``, inputs motor torques [Nm], outputs motor
+        angles [rad]; derivatives are exact (dual numbers). ``joint_angle_rad`` and ``effects`` are as in
+        `equilibrium`.
         """
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
         return self.core.linearize(core_effects(self.placed(effects)), at)
@@ -439,10 +475,11 @@ class Robot:
     def modes(
         self, joint_angle_rad: Sequence[float] | None = None, effects: Iterable[Effect] = ()
     ) -> xr.Dataset:
-        """Return the modes, slowest first.
+        """Return the modes of the linearized robot, slowest first.
 
-        Variables ``eigenvalue_rad_s``, ``frequency_hz``, ``damping_ratio``
-        (mode) and ``shape`` (mode, state; largest element one).
+        Variables are ``eigenvalue_rad_s`` [rad/s], ``frequency_hz`` [Hz], ``damping_ratio`` [1] (mode) and
+        ``shape`` (mode, state; largest element one). The states are those of `linearize`;
+        ``joint_angle_rad`` and ``effects`` are as in `equilibrium`.
         """
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
         values, frequency, damping, shapes = self.core.modes(core_effects(self.placed(effects)), at)
@@ -463,8 +500,9 @@ class Robot:
     ) -> xr.DataArray:
         """Return the zero-order-hold response from motor torque to motor angle.
 
-        Dims (frequency_hz, output, input), complex [rad/Nm]. This, not the
-        continuous response, is the true response of a sampled loop.
+        Dims (frequency_hz, output, input), complex [rad/Nm]; ``frequency_hz`` (n,) is in Hz. The response of
+        a sampled loop is this one, not the continuous one. ``joint_angle_rad`` and ``effects`` are as in
+        `equilibrium`.
         """
         f = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
@@ -486,18 +524,18 @@ class Robot:
 
 
 def load_robot(source: Path | str, *, sample_time_s: float | None = None) -> Robot:
-    """Return the robot of a ``source``: a TOML file, a model file (URDF, MJCF, DH table), or a preset's name.
+    """Return the robot of a ``source``: a TOML file, a model file (URDF, MJCF, DH table) or a preset.
 
     Presets: ``irb6600_like`` (20 states) and ``two_mass_axis`` (thesis Table 9.1,
-    model m3, with its cubic spring and Coulomb friction). ``sample_time_s`` is that of a model file
-    whose drive data state none; robot files state theirs. Model files are read as
-    `axisight.robot_import.import_robot` does. Raises RobotError naming file, line, key and expectation.
+    model m3, with its cubic spring and Coulomb friction). `axisight.robot_import.import_robot` reads model
+    files. ``sample_time_s`` [s] is for a model file whose drive data state no sample time; robot files
+    state their own. Raises RobotError naming file, line, key and expectation.
     """
     if isinstance(source, str) and source in PRESETS:
         text = (resources.files("axisight.robot.presets") / f"{source}.toml").read_text("utf-8")
         return Robot.from_toml(text)
     path = usable_path(source, RobotError)
-    # Stands above robots: only those who have such a file load its readers.
+    # Imported here, as `robot_import` itself imports this package, and its readers load slowly.
     if is_model_file(path):
         found: Robot = import_module("axisight.robot_import").import_robot(
             path, sample_time_s=sample_time_s

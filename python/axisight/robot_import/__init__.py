@@ -1,6 +1,6 @@
-"""Robots out of the model files that people have: URDF, MJCF, tables of Denavit and Hartenberg.
+"""Import robots from model files: URDF, MJCF, and tables of Denavit and Hartenberg (DH).
 
-Apart from `axisight.robot`, which reads them by `load_robot` with what stands here.
+`axisight.robot.load_robot` uses this package for model files.
 """
 
 from axisight.robot.sources import is_model_file

@@ -1,4 +1,4 @@
-"""Rigid bodies of a model file and how they hang together, before a chain is made of them."""
+"""The tree of rigid bodies in a model file, from which `chain` makes a serial chain."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ class Pose:
     origin: Array
 
     def __matmul__(self, other: Pose) -> Pose:
-        """Return the pose of a frame that ``other`` says in this one."""
+        """Return the pose, in the outer frame, of a frame whose pose in this frame is ``other``."""
         return Pose(self.rotation @ other.rotation, self.origin + self.rotation @ other.origin)
 
     def inverse(self) -> Pose:
-        """Return the pose of the other frame in this one."""
+        """Return the pose of the outer frame in this frame."""
         back = self.rotation.T
         return Pose(back, -back @ self.origin)
 
 
 def still() -> Pose:
-    """Return the pose of a frame in itself."""
+    """Return the identity pose."""
     return Pose(np.eye(3), np.zeros(3))
 
 
@@ -45,7 +45,7 @@ class Mass:
     inertia_kg_m2: Array
 
     def at(self, pose: Pose) -> Mass:
-        """Return the same in the frame in which ``pose`` says this one."""
+        """Return the same mass in the outer frame, in which ``pose`` is the pose of this frame."""
         rotation = pose.rotation
         return Mass(
             self.mass_kg,
@@ -55,7 +55,7 @@ class Mass:
 
 
 def joined(parts: Iterable[Mass]) -> Mass | None:
-    """Return several masses of one frame as one body; None without any mass."""
+    """Return several masses in the same frame as one body; None if there is no mass."""
     known = [part for part in parts if part.mass_kg > 0 or np.any(part.inertia_kg_m2)]
     if not known:
         return None
@@ -73,17 +73,22 @@ def joined(parts: Iterable[Mass]) -> Mass | None:
 
 @dataclass(frozen=True)
 class Drive:
-    """What a file says of the drive of a joint, on the joint side unless said otherwise.
+    """The drive of a joint as the model file states it, joint-side unless noted.
 
-    ``gear_ratio`` r is joint angle per motor angle; ``rotor_inertia`` [kg m^2] as reflected to the joint,
-    ``damping`` [Nm s/rad], ``friction`` [Nm], ``spring`` [Nm/rad] that pulls the joint to
-    ``spring_rest_rad``; ``servo`` of an actuator that is told positions, its gains of position [Nm/rad] and
-    speed [Nm s/rad], motor side; ``gain`` is a motor's torque per command, ``limit_nm`` the largest,
-    ``delay_s`` and ``lag_s`` by which torque is late; ``effort`` [Nm] the limit of the joint, 0 where none is
-    said; ``of_actuators`` is how much of rotor inertia and damping the file has on actuators; ``force_limits``
-    [Nm] of its only actuator, before the gear, and of the joint, not a number where they are not alike both
-    ways; ``speed_gain`` [Nm s/rad] of an actuator that is told speeds, motor side; ``sums_up``: an actuator
-    of the joint has as its target the sum of what it is told.
+    - ``gear_ratio`` r: joint angle per motor angle [1, or m/rad]
+    - ``rotor_inertia``: inertia of the rotor reflected to the joint [kg m^2]
+    - ``damping`` [Nm s/rad], ``friction``: dry friction [Nm]
+    - ``spring`` [Nm/rad]: a spring that pulls the joint to ``spring_rest_rad`` [rad]
+    - ``servo``: gains on position [Nm/rad] and speed [Nm s/rad] of an actuator with position targets,
+      motor-side
+    - ``gain``: torque of the motor per command; ``limit_nm``: largest motor torque [Nm]
+    - ``delay_s``, ``lag_s``: delay and first-order lag of the torque [s]
+    - ``effort``: torque limit of the joint [Nm], 0 if the file states none
+    - ``of_actuators``: the parts of rotor inertia and damping that the file states on actuators
+    - ``force_limits``: limits [Nm] of the only actuator, before the gear, and of the joint; NaN if a limit is
+      not the same in both directions
+    - ``speed_gain`` [Nm s/rad]: gain of an actuator with speed targets, motor-side
+    - ``sums_up``: an actuator of the joint integrates its commands to its target
     """
 
     gear_ratio: float = 1.0
@@ -106,11 +111,12 @@ class Drive:
 
 @dataclass(frozen=True)
 class Steps:
-    """The steps of a simulator whose file a model is: speeds it computes are those of the middle of steps.
+    """The time steps of the simulator of a model file, which change how its actuators act.
 
-    Forces act around the beginning of a step of ``step_s``, so that a target acts from half of it before.
-    ``gains`` and ``damping`` say where speeds are taken that those of actuators and of joints act on: at
-    the end of a step (1) or before it (-1). Half a step late, a damping is also an inertia.
+    The simulator computes speeds for the middle of a step, and forces act around its start. So a target acts
+    from half a step earlier; ``step_s`` is the step [s]. ``gains`` is 1 if the speed gains of actuators act
+    on the speed at the end of a step, and -1 if they act on the speed before it. ``damping`` is the same for
+    the damping of joints. A damping that acts half a step off is also an inertia.
     """
 
     step_s: float
@@ -118,7 +124,7 @@ class Steps:
     damping: int
 
     def added_inertia(self, gain_nm_s_rad: float, damping_nm_s_rad: float) -> float:
-        """Return what both add to the inertia [kg m^2] of a motor, on whose side they are."""
+        """Return the inertia [kg m^2] that a speed gain and a damping add, on the side on which they act."""
         return 0.5 * self.step_s * (self.gains * gain_nm_s_rad + self.damping * damping_nm_s_rad)
 
 
@@ -126,9 +132,10 @@ class Steps:
 class Body:
     """A body and the joint that moves it.
 
-    ``pose``: its frame in the parent's with the joint at zero; ``axis`` (3,): of the joint, in its own
-    frame; ``where``: its place in the file; ``refused``: why its joint cannot be one of a chain; ``of``: the
-    body it moves, where that is another one; ``bare``: another joint of that body follows.
+    ``pose`` is the frame of the body in that of its parent, with the joint at zero. ``axis`` (3,) is the
+    joint axis in the frame of the body. ``where`` is the place in the file, for messages. ``refused`` says
+    why a chain cannot have its joint. If the body only stands for a joint, ``of`` is the body in the file
+    that the joint moves. ``bare`` means that another joint of that body follows.
     """
 
     name: str
@@ -148,9 +155,10 @@ class Body:
 
 @dataclass
 class Tree:
-    """All bodies of a file by name, parents before children; ``notes``: what a chain cannot say of it.
+    """All bodies of a file by name, parents before children.
 
-    ``steps`` of the simulator whose file it is, where they show.
+    ``notes`` lists what a chain cannot state. ``steps`` are the time steps of the simulator of the file, None
+    if they have no visible effect. ``gravity_m_s2`` (3,) [m/s^2] is None if the file states none.
     """
 
     name: str
@@ -161,11 +169,11 @@ class Tree:
     steps: Steps | None = None
 
     def children(self, name: str) -> list[Body]:
-        """Return the bodies that hang on one."""
+        """Return the bodies whose parent is ``name``."""
         return [body for body in self.bodies.values() if body.parent == name]
 
     def path(self, tip: str) -> list[Body]:
-        """Return the bodies from the root to one, both included."""
+        """Return the bodies from the root to ``tip``, both included."""
         out = [self.bodies[tip]]
         while (parent := out[-1].parent) is not None:
             out.append(self.bodies[parent])

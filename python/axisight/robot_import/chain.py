@@ -1,4 +1,4 @@
-"""A serial chain out of a tree of bodies: fixed joints merged, branches refused or carried along."""
+"""Make a serial chain from a tree of bodies: merge fixed joints, and refuse or lock other branches."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ChainJoint:
-    """A joint of the chain, in frames that are parallel to the base's at zero angle.
+    """A joint of the chain, in frames that are parallel to the base frame at zero angle.
 
-    ``origin_m`` and ``axis`` (3,) stand in the parent's frame, ``mass`` in its own; ``body`` is what the
-    file has, whose frame is turned by ``rotation`` (3, 3) in the joint's.
+    ``origin_m`` (3,) [m] and ``axis`` (3,) are in the parent's frame, ``mass`` is in the frame of the joint.
+    ``body`` is the body in the file; ``rotation`` (3, 3) is the orientation of its frame in the joint's.
     """
 
     body: Body
@@ -32,10 +32,10 @@ class ChainJoint:
 
 @dataclass(frozen=True)
 class Chain:
-    """A serial chain from a model file, and what is to be said of how it came about.
+    """A serial chain from a model file, with notes on how it was made.
 
-    ``end``: the frame of the last link, as the file has it, in that of the last joint; ``steps`` of the
-    simulator whose file it is.
+    ``end`` is the pose of the last link's frame in the file, in the frame of the last joint. ``steps`` are
+    the time steps of the simulator of the file.
     """
 
     name: str
@@ -52,12 +52,12 @@ STANDARD_GRAVITY_M_S2 = 9.81
 def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Chain:
     """Return the serial chain between two bodies of a tree.
 
-    ``base``: the body that stands still, the root unless given; ``tip``: the last body, else the end of
-    the only moving branch. Bodies on fixed joints join what they hang on. With a ``tip`` other moving
-    branches are locked at zero, their masses carried along, and so is what is beyond it.
+    ``base`` is the fixed body, by default the root. ``tip`` is the last body, by default the end of the only
+    moving branch. Bodies on fixed joints are merged with their parents. With a ``tip``, other moving branches
+    and everything beyond the tip are locked at zero; their masses stay.
 
-    Raises RobotError for bodies that are not there, a branch without a ``tip``, joints that a chain cannot
-    have, moving bodies without mass, and inertias that no body has.
+    Raises RobotError for bodies that are not there, several branches without a ``tip``, joints that a chain
+    cannot have, moving bodies without mass, and inertias that no body has.
     """
     root = next(iter(tree.bodies.values()))
     for option, name in (("base", base), ("tip", tip)):
@@ -89,7 +89,7 @@ def _listed(names: Sequence[str] | dict[str, Body]) -> str:
 
 
 def _only_end(tree: Tree, first: str) -> str:
-    """Return the last moving body below ``first``; raises RobotError where there are several."""
+    """Return the last moving body below ``first``; raise RobotError if there are several branches."""
     ends = _ends(tree, first)
     if len(ends) > 1:
         shown = [tree.bodies[end].of or end for end in ends]
@@ -115,12 +115,12 @@ def _ends(tree: Tree, first: str) -> list[str]:
 
 
 def _joints(tree: Tree, path: Sequence[Body]) -> tuple[list[ChainJoint], Pose, list[str]]:
-    """Return the moving joints along a path, the last body in the frame of the last, and what was locked."""
+    """Return the moving joints along a path, the last body's pose in the last joint's frame, and notes."""
     chosen = {body.name for body in path}
-    # Orientation of the first body in the base of the file: gravity is said there.
+    # Start from the orientation in the root frame, in which the file states gravity.
     here = Pose(_from_root(tree, path[0]).rotation, np.zeros(3))
     locked: list[str] = []
-    # What moves with the joint before; of the base, nobody needs it.
+    # Masses that move with the previous joint; those fixed to the base do not matter.
     with_last: list[Mass] = []
     moving: list[tuple[Body, Pose, list[Mass]]] = []
     for body in path[1:]:
@@ -159,7 +159,7 @@ def _from_root(tree: Tree, body: Body) -> Pose:
 
 
 def _carried(tree: Tree, body: Body, here: Pose, chosen: set[str], locked: list[str]) -> list[Mass]:
-    """Return the masses of a body and all that hangs on it but the chain, in the frame of the base."""
+    """Return the masses of a body and of all its branches outside the chain, in the base frame."""
     out = [] if body.mass is None else [body.mass.at(here)]
     for child in tree.children(body.name):
         if child.name not in chosen:
@@ -170,7 +170,7 @@ def _carried(tree: Tree, body: Body, here: Pose, chosen: set[str], locked: list[
 
 
 def _check(body: Body, mass: Mass | None) -> None:
-    """Raise RobotError for a moving body that cannot exist."""
+    """Raise RobotError for a moving body without mass or with an impossible inertia."""
     if mass is None and body.bare:
         return
     what = f"{(body.of or body.name)!r} and all that is fixed to it"

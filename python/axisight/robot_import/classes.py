@@ -1,7 +1,7 @@
-"""Rotors of typical machines, for model files that leave them out: by class of robot and effort limit.
+"""Typical rotor inertias for model files without rotors, by class of robot and effort limit.
 
-Only rotors: a ratio that is nearly right is wrong, and friction differs by its oil and age; neither is a parameter
-that a diagnosis could mend within a tolerance.
+Gear ratios and friction are not filled in. A gear ratio that is nearly right is wrong, and friction depends
+on oil and age; a re-fit within tolerances could correct neither.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from axisight.robot_import.chain import ChainJoint
 from axisight.robot_import.drives import DriveData, JointDrive, RobotClass
 
-# Effort limit [Nm] and inertia of the rotor as reflected to the joint [kg m^2] of known joints; sources in
-# docs/models.md.
+# (effort limit [Nm], rotor inertia reflected to the joint [kg m^2]) of known joints; docs/models.md has the
+# sources.
 _KNOWN: dict[RobotClass, tuple[tuple[float, float], ...]] = {
     "cobot": ((87.0, 0.606), (87.0, 0.606), (87.0, 0.462), (87.0, 0.462), *3 * ((12.0, 0.206),)),
     "industrial": (
@@ -27,27 +27,30 @@ _KNOWN: dict[RobotClass, tuple[tuple[float, float], ...]] = {
     ),
     "desktop": ((10.0, 0.0266), (7.3, 0.0120), (0.52, 0.00199)),
 }
-# A size beyond the known ones by more than this is no joint of such a robot, or no limit at all.
+# An effort limit beyond the known ones by more than this factor is not a real limit, or of another class.
 _BEYOND = 4.0
 TOLERANCE = 0.6
-"""Relative standard deviation of a rotor by class: servos of one size differ by a factor of two and more."""
+"""Tolerance of a rotor inertia by class [1]: servos of one size differ by a factor of two and more."""
 
 
 def effort_range_nm(kind: RobotClass) -> tuple[float, float]:
-    """Return the effort limits [Nm] of joints for which a class says a rotor."""
+    """Return the smallest and largest effort limit [Nm] for which a class gives a rotor."""
     efforts = [effort for effort, _ in _KNOWN[kind]]
     return min(efforts) / _BEYOND, max(efforts) * _BEYOND
 
 
 def rotor_inertia(kind: RobotClass, effort_nm: float) -> float:
-    """Return the reflected inertia [kg m^2] of a typical rotor: through those known, a power of the effort limit."""
+    """Return a typical reflected rotor inertia [kg m^2], from a power law through the known joints."""
     effort, inertia = np.log(np.array(_KNOWN[kind])).T
     slope, level = np.polyfit(effort, inertia, 1)
     return float(np.exp(level + slope * np.log(effort_nm)))
 
 
 def with_rotors(joints: Sequence[ChainJoint], drives: DriveData) -> tuple[DriveData, list[str]]:
-    """Return drive data with the rotors that neither they nor the file have, by class, and what to say of it."""
+    """Return the drive data with missing rotors filled in by class, and notes on them.
+
+    A rotor is missing if neither the drive data nor the model file state it.
+    """
     kind = drives.robot_class
     if kind is None:
         return drives, []
@@ -82,7 +85,7 @@ def with_rotors(joints: Sequence[ChainJoint], drives: DriveData) -> tuple[DriveD
 def _filled(
     name: str, inertia: float, joints: Sequence[ChainJoint], drives: DriveData
 ) -> JointDrive:
-    """Return the drive of a joint with a rotor of a reflected inertia [kg m^2]."""
+    """Return the drive data of a joint with a rotor; ``inertia`` [kg m^2] is reflected to the joint."""
     own = drives.joint.get(name, JointDrive())
     of_file = next(joint.body.drive.gear_ratio for joint in joints if joint.body.joint == name)
     ratio = of_file if own.gear_ratio is None else own.gear_ratio

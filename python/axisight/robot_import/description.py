@@ -1,4 +1,4 @@
-"""A chain and its drives written as a robot file."""
+"""Write a chain and its drives as a robot file."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from axisight.robot_import.chain import Chain, ChainJoint
 from axisight.robot_import.classes import with_rotors
 from axisight.robot_import.drives import DriveData, JointDrive, Payload
 
-# Of the simulators that read such files; logs say another where they have one.
+# Usual in simulators for such files; logs and drive data may state another.
 DEFAULT_SAMPLE_TIME_S = 1e-3
-# Of dry friction near standstill, on the joint side: files have none.
+# Speed over which dry friction changes sign, joint-side; model files do not state it.
 _SMOOTHING_RAD_S = 0.01
 
 
 def description(chain: Chain, drives: DriveData, source: str) -> str:
-    """Return the text of a robot file (``axisight.robot/2``); ``source`` is named at its head.
+    """Return the text of a robot file (``axisight.robot/2``); its head names ``source``.
 
     Raises RobotError for drive data of joints that the chain does not have.
     """
@@ -76,8 +76,11 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
         "gravity": _floats(chain.gravity_m_s2),
         "sample_time": drives.sample_time or DEFAULT_SAMPLE_TIME_S,
         "joint": tables,
-        "operating_point": {"joint_angle": drives.operating_point or _rest(joints)},
     }
+    pose = drives.operating_point or _rest(joints)
+    # Zero is what a robot file without a pose means: whoever reads it sees that none was stated.
+    if drives.operating_point is not None or any(pose):
+        document["operating_point"] = {"joint_angle": pose}
     controller = controller_of(chain, drives)
     if controller is not None:
         document["controller"] = controller
@@ -98,14 +101,17 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
 
 
 def controller_of(chain: Chain, drives: DriveData) -> dict[str, Any] | None:
-    """Return the controller of the drive data, else that of actuators which are all told positions."""
+    """Return the controller table of the drive data, else of the actuators; None without one.
+
+    Actuators give a controller only if every joint has one with position targets.
+    """
     if drives.controller is not None:
         return drives.controller
     said = [joint.body.drive for joint in chain.joints]
     servos = [(drive, drive.servo) for drive in said if drive.servo is not None]
     if len(servos) < len(said):
         return None
-    # Gains are of the file's motors, by the square of the ratio of those that are taken.
+    # Drive data may change the gear ratio, and motor-side gains scale with its square.
     given = [drives.joint.get(joint.body.joint, JointDrive()) for joint in chain.joints]
     by = [
         (_ratio(joint, drive) / joint.body.drive.gear_ratio) ** 2
@@ -128,7 +134,7 @@ def controller_of(chain: Chain, drives: DriveData) -> dict[str, Any] | None:
 
 
 def _ratio(joint: ChainJoint, drive: JointDrive) -> float:
-    """Return the gear ratio of a joint: that of its drive data, else the file's."""
+    """Return the gear ratio of a joint from its drive data, else from the model file."""
     return joint.body.drive.gear_ratio if drive.gear_ratio is None else drive.gear_ratio
 
 
@@ -138,7 +144,7 @@ def _defaults(
     drives: DriveData,
     controller: dict[str, Any] | None,
 ) -> list[str]:
-    """Return what was taken where neither the model file nor the drive data say anything."""
+    """Return notes on the defaults for everything that neither the model file nor the drive data state."""
     out = []
     servos = [joint.body.joint for joint in chain.joints if joint.body.drive.servo is not None]
     if all(table["drive"]["gear_ratio"] == 1.0 for table in tables):
@@ -159,7 +165,7 @@ def _defaults(
 
 
 def _told_speeds(chain: Chain) -> list[str]:
-    """Return what becomes of actuators that are told speeds, whose law no controller is."""
+    """Return a note on actuators with speed targets, whose law a robot file cannot state."""
     gains = [(joint.body.joint, joint.body.drive.speed_gain) for joint in chain.joints]
     said = [f"{name} {gain:g}" for name, gain in gains if gain is not None]
     if not said:
@@ -172,13 +178,13 @@ def _told_speeds(chain: Chain) -> list[str]:
 
 
 def torque_constants(chain: Chain, drives: DriveData) -> list[float | None]:
-    """Return the torque constant of every motor [Nm/A], None where the drive data state none."""
+    """Return the torque constant of every motor [Nm/A]; None if the drive data state none."""
     stated = (drives.joint.get(joint.body.joint) for joint in chain.joints)
     return [None if drive is None else drive.torque_constant for drive in stated]
 
 
 def _constants(chain: Chain, drives: DriveData) -> list[str]:
-    """Say which torque constants logs of this model are read by, and where they go with a robot file."""
+    """Return a note on the torque constants, which a robot file cannot state."""
     pairs = zip(chain.joints, torque_constants(chain, drives), strict=True)
     known = [f"{joint.body.joint} {value:g}" for joint, value in pairs if value is not None]
     if not known:
@@ -194,7 +200,7 @@ def _line(text: str) -> str:
 
 
 def _joint(joint: ChainJoint, mass: Mass | None, drive: JointDrive) -> tuple[dict[str, Any], float]:
-    """Return the table of a joint and its gear ratio."""
+    """Return the table of a joint for the robot file, and its gear ratio."""
     said = joint.body.drive
     ratio = _ratio(joint, drive)
     rotor = said.rotor_inertia * ratio**2 if drive.motor_inertia is None else drive.motor_inertia
@@ -227,9 +233,9 @@ def _joint(joint: ChainJoint, mass: Mass | None, drive: JointDrive) -> tuple[dic
 
 
 def _torque_path(drive: Drive, axis: int, ratio: float) -> list[dict[str, Any]]:
-    """Return what a motor makes of its command: a limit, a delay, a lag, a gain other than one.
+    """Return the effects between command and torque of a motor: limit, delay, lag, and a gain other than 1.
 
-    ``ratio``: of the gear that is taken, which another one than the file's makes other torques of a motor.
+    ``ratio`` is the gear ratio in use. If it differs from that of the file, the motor-side limit changes.
     """
     limit = drive.limit_nm * abs(ratio / drive.gear_ratio)
     values = {
@@ -246,7 +252,7 @@ def _torque_path(drive: Drive, axis: int, ratio: float) -> list[dict[str, Any]]:
 
 
 def _dry_friction(joint: ChainJoint, drive: JointDrive, ratio: float) -> float:
-    """Return the dry friction of a joint on the motor side [Nm]."""
+    """Return the dry friction of a joint, motor-side [Nm]."""
     if drive.coulomb_friction is not None:
         return drive.coulomb_friction
     return joint.body.drive.friction * abs(ratio)
@@ -260,7 +266,7 @@ def _loaded(mass: Mass | None, payload: Payload | None, end: Pose) -> Mass | Non
 
 
 def _rest(joints: list[ChainJoint]) -> list[float]:
-    """Return zero, or the middle of the range of joints that cannot be at zero."""
+    """Return the default operating point: zero, or the middle of the range if zero is outside."""
     out = []
     for joint in joints:
         lower, upper = joint.body.limits or (0.0, 0.0)

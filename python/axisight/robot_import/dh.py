@@ -1,4 +1,4 @@
-"""Tables of Denavit and Hartenberg, standard and modified."""
+"""Read tables of Denavit and Hartenberg, in the standard and the modified convention."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ Array = NDArray[np.float64]
 
 
 def read_dh(path: Path) -> Tree:
-    """Return the bodies of a table; raises RobotError naming file, line or joint, and column.
+    """Return the bodies of a table; raise RobotError naming file, line or joint, and column.
 
-    A row says a joint and its link: ``theta``, ``d``, ``a``, ``alpha`` at joint angle zero, mass, centre of
-    mass and inertia about it [kg m^2] in the frame of the row. ``convention`` is ``standard`` (the joint turns
-    about z of the frame before; Denavit and Hartenberg 1955) or ``modified`` (about z of its own; Craig 1986).
+    A row states a joint and its link: ``theta``, ``d``, ``a`` and ``alpha`` at joint angle zero [rad, m],
+    mass [kg], centre of mass [m] and inertia about it [kg m^2] in the frame of the row. With ``convention``
+    ``standard`` the joint turns about z of the previous frame (Denavit and Hartenberg 1955), with
+    ``modified`` about z of its own frame (Craig 1986).
     """
     bodies = {"base": Body("base", None, "", "fixed", still(), np.zeros(3), None, str(path))}
     parent = "base"
@@ -34,7 +35,7 @@ def read_dh(path: Path) -> Tree:
 
 
 def _bodies(row: dict[str, str], parent: str, where: str) -> list[Body]:
-    """Return the joint of a row and, in the standard convention, the frame at the end of its link."""
+    """Return the bodies of a row: joint and link, in the modified convention as one body."""
     convention, motion = row.get("convention", ""), row["motion"]
     if convention not in CONVENTIONS:
         expected = " or ".join(CONVENTIONS)

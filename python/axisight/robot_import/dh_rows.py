@@ -1,4 +1,4 @@
-"""The rows of tables of Denavit and Hartenberg, out of CSV and TOML: texts by the names of columns."""
+"""Read the rows of tables of Denavit and Hartenberg from CSV or TOML, as text by column."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ GEOMETRY = ("theta_rad", "d_m", "a_m", "alpha_rad")
 COM = ("com_x_m", "com_y_m", "com_z_m")
 INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 COLUMNS = ("joint", "convention", "motion", *GEOMETRY, "mass_kg", *COM, *INERTIA)
-"""Columns of a table, in any order; ``motion`` may be left out, and products of inertia."""
+"""Columns of a table, in any order; those in `OPTIONAL` may be left out."""
 OPTIONAL = {"motion": "revolute", "ixy": "0", "ixz": "0", "iyz": "0"}
 
 Row = tuple[str, dict[str, str]]
-"""Where a row stands, for messages, and its texts by column."""
+"""The place of a row, for messages, and its text by column."""
 _WORDS = ("joint", "motion")
-# A TOML says the convention once, at its head.
+# A TOML file states the convention once, at its head.
 _KEYS = tuple(name for name in COLUMNS if name != "convention")
 
 
 def rows_of(path: Path) -> list[Row]:
-    """Return the rows of a table; raises RobotError naming file, line (of a CSV), joint and column."""
+    """Return the rows of a table; raise RobotError naming file, line (of a CSV), joint and column."""
     return _toml_rows(path) if path.suffix.lower() == ".toml" else _csv_rows(path)
 
 
@@ -37,7 +37,7 @@ def _csv_rows(path: Path) -> list[Row]:
         with path.open(encoding="utf-8", newline="") as file:
             lines = [(n, x) for n, x in enumerate(file, start=1) if not x.startswith("#")]
         reader = csv.DictReader(text for _, text in lines)
-        # The reader counts what it gets, and comments are none of it.
+        # The reader does not see comment lines, so its line numbers must be converted.
         found = [(lines[reader.line_num - 1][0], row) for row in reader]
         names = reader.fieldnames or []
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -83,7 +83,7 @@ def _toml_rows(path: Path) -> list[Row]:
 
 
 def _texts(path: Path, number: int, table: dict[str, Any]) -> Row:
-    """Return a joint of a TOML as a CSV would say it: what Python writes of a number reads as the same."""
+    """Return a joint of a TOML file as text, as in a CSV; `repr` keeps every bit of a number."""
     where = f"{path}, [[joint]] {number}"
     _check_names(list(table), _KEYS, f"{where}, joint {shown(table.get('joint', ''))}", "keys")
     texts = {}
@@ -111,7 +111,7 @@ def _check_names(names: Collection[str], known: tuple[str, ...], where: str, wha
 
 
 def _named(rows: Iterable[Row]) -> list[Row]:
-    """Return rows with what was left out; raises RobotError for names of joints that are none or not new."""
+    """Return rows with optional columns filled in; raise RobotError for missing or repeated joint names."""
     found: list[Row] = []
     seen: set[str] = set()
     for where, texts in rows:

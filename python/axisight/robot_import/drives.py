@@ -1,4 +1,4 @@
-"""What model files lack of drives: gear ratios, rotors, controller, sample time, from a TOML file."""
+"""Drive data: a TOML file with gear ratios, rotors, controller and sample time, which model files lack."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ RobotClass = Literal["cobot", "industrial", "desktop"]
 
 
 class _Strict(BaseModel):
-    """Unknown keys are refused."""
+    """A model that refuses unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class JointDrive(_Strict):
-    """Drive of one joint; what is left out is as the model file has it.
+    """Drive of one joint; a value that is None comes from the model file.
 
-    ``gear_ratio`` r: joint angle per motor angle [1, m/rad]; ``motor_inertia`` [kg m^2],
-    ``viscous_friction`` [Nm s/rad] and ``coulomb_friction`` [Nm] on the motor side; ``stiffness``
-    [Nm/rad] and ``damping`` [Nm s/rad] of the gear, on the joint side, both or neither;
-    ``torque_constant`` [Nm/A], motor side, by which currents in logs are torques.
+    ``gear_ratio`` r is joint angle per motor angle [1, or m/rad]. ``motor_inertia`` [kg m^2],
+    ``viscous_friction`` [Nm s/rad] and ``coulomb_friction`` [Nm] are motor-side. ``stiffness`` [Nm/rad] and
+    ``damping`` [Nm s/rad] of the gear are joint-side; state both or neither. ``torque_constant`` [Nm/A],
+    motor-side, converts currents in logs to torques.
     """
 
     gear_ratio: Annotated[_Finite, AfterValidator(_not_zero)] | None = None
@@ -50,19 +50,19 @@ class JointDrive(_Strict):
 
 
 class Payload(_Strict):
-    """A load mounted by hand: mass [kg] and centre of mass [m] in the frame of the last link."""
+    """A load on the last link: mass [kg], and centre of mass (3,) [m] in the frame of that link."""
 
     mass: _Positive
     com: tuple[_Finite, _Finite, _Finite] = (0.0, 0.0, 0.0)
 
 
 class DriveData(_Strict):
-    """The file: all of it may be left out.
+    """The content of the file; every key is optional.
 
-    ``robot_class``, ``class`` in the file, says which typical rotors stand for those that nothing says;
-    ``base``, ``tip``: links between which the chain runs; ``sample_time`` [s]; ``position_noise_std``
-    [rad], motor side; ``operating_point`` [rad or m] of the driven joints; ``controller`` and
-    ``tolerances`` as in a robot file; ``joint`` by name.
+    ``robot_class`` (key ``class``) selects typical rotors for joints without one. ``base`` and ``tip`` are
+    the first and last link of the chain. ``sample_time`` is in s, ``position_noise_std`` in rad, motor-side.
+    ``operating_point`` (n_axes,) [rad or m] are the angles of the driven joints. ``controller`` and
+    ``tolerances`` are as in a robot file. ``joint`` holds the drives by joint name.
     """
 
     robot_class: RobotClass | None = Field(default=None, alias="class")
@@ -78,7 +78,7 @@ class DriveData(_Strict):
 
 
 def read_drives(path: Path) -> DriveData:
-    """Return the drive data of a TOML file; raises RobotError naming file and key."""
+    """Return the drive data in a TOML file; raise RobotError naming file and key."""
     try:
         content = parse_toml(read_text(path))
     except (OSError, UnicodeDecodeError) as error:

@@ -1,4 +1,4 @@
-"""Model files by their kind."""
+"""Import a model file of any kind as a robot."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from axisight.robot_import.xml_tree import read_xml
 
 
 def drives_path(source: Path | str) -> Path:
-    """Return where drive data of a model file stand: ``arm.drives.toml`` beside ``arm.urdf``."""
+    """Return the default path of the drive data of a model file: ``arm.drives.toml`` beside ``arm.urdf``."""
     path = Path(source)
     return path.with_name(f"{path.stem}.drives.toml")
 
 
 def drive_data(source: Path | str | Any, given: Path | str | None = None) -> DriveData:
-    """Return the drive data of a model: those ``given``, else those beside its file, if there are any."""
+    """Return the drive data of a model from the file ``given``, else from that beside the model, if any."""
     file = drives_file(source, given)
     return DriveData() if file is None else read_drives(file)
 
 
 def drives_file(source: Path | str | Any, given: Path | str | None) -> Path | None:
-    """Return the file of a model's drive data: that ``given``, else that beside it, None without."""
+    """Return the file of a model's drive data: ``given``, else the one beside the model, else None."""
     if given is not None:
         return Path(given)
     beside = isinstance(source, str | Path) and drives_path(source).is_file()
@@ -48,22 +48,24 @@ def import_robot(
     drives: DriveData | Path | str | None = None,
     sample_time_s: float | None = None,
 ) -> Robot:
-    """Return the robot of a model file; ``robot.toml`` is the robot file that says the same.
+    """Return the robot of a model file; its attribute `toml` is the equivalent robot file.
 
     Parameters
     ----------
     source : URDF (``.urdf``, or ``.xml`` with <robot>), MJCF (``.xml``, ``.mjcf``), a table of Denavit
         and Hartenberg (``.csv``, ``.toml``), or a ``pinocchio.Model``.
-    base, tip : links (bodies; joints of a ``pinocchio.Model``) between which the chain runs: the root, and
-        the end of the only moving branch, unless given here or in the drive data.
-    drives : what the file lacks of drives: data or their TOML file; of a file ``arm.urdf`` it is
-        ``arm.drives.toml`` beside it, if there is one. Left out, gears are rigid with the
-        ratio of the file or 1, rotors and friction as the file has them, and there is no controller.
-    sample_time_s : where the drive data state none, instead of 1 ms.
+    base, tip : first and last link of the chain (bodies in MJCF, joints of a ``pinocchio.Model``). If neither
+        they nor the drive data state them, these are the root and the end of the only moving branch.
+    drives : drive data, or their TOML file; by default ``arm.drives.toml`` beside ``arm.urdf``, if there is
+        one. Without drive data, gears are rigid with the ratio of the file or 1, and rotors and friction are
+        those of the file. There is then a controller only if every joint of an MJCF has position targets.
+    sample_time_s : sample time [s] if the drive data state none; by default 1 ms.
 
-    Links on fixed joints join what they hang on; frames are turned parallel to the base's at zero angle,
-    as robot files have them; angles are those of the file. Raises RobotError, with file, line and element, for
-    what cannot be one serial chain, MissingExtraError for MJCF without MuJoCo.
+    Links on fixed joints are merged with their parents. As in every robot file, frames are parallel to the
+    base frame at zero angle. Joint angles are those of the file.
+
+    Raises RobotError, with file, line and element, for everything that is not one serial chain. Raises
+    MissingExtraError for MJCF if MuJoCo is not installed.
 
     """
     named = Path(source).name if isinstance(source, str | Path) else "a pinocchio.Model"
@@ -77,6 +79,8 @@ def import_robot(
         stated = drives if step_s is None else drives.model_copy(update={"sample_time": step_s})
         try:
             robot = Robot.from_toml(description(chain, stated, named))
+            if drives.operating_point is None:
+                robot = robot.without_stated_pose()
             return robot.with_torque_constants(torque_constants(chain, stated))
         except RobotError as error:
             raise RobotError(f"{tree.file}: what was made of it is no robot: {error}") from None
@@ -87,14 +91,14 @@ def import_robot(
     return robot if drives.controller is not None else built(step_of_servos(robot))
 
 
-# Longest step of actuators that hold positions between samples of logs [s], and how far damping may slow a
-# joint in one: beyond twice as far it would swing.
+# Longest step [s] of a controller that holds its command between the samples of a log, and the largest share
+# of its speed that a joint may lose by damping in one step; at twice this share it would oscillate.
 _SERVO_STEP_S = 2e-3
 _SLOWED = 0.4
 
 
 def step_of_servos(robot: Robot) -> float:
-    """Return the sample time [s] for a robot's controller: its own, or a whole share of it for servos."""
+    """Return the sample time [s] of a robot's controller, for position servos divided by a whole number."""
     time = robot.sample_time_s
     if robot.controller_kind != "pd_position":
         return time
@@ -103,9 +107,9 @@ def step_of_servos(robot: Robot) -> float:
     inertia = robot.inertia_matrix(rest)
     for joint in robot.axis_joints:
         drive = robot.joints[joint].drive
-        assert drive is not None  # an axis has one
+        assert drive is not None  # every axis has a drive
         inertia[joint, joint] += drive.motor_inertia / drive.gear_ratio**2
-    # Of a motor with all that gives way behind it.
+    # The inertia that a motor accelerates if all other joints are free to move.
     felt = robot.gear_ratio**2 / np.diag(np.linalg.inv(inertia))[robot.axis_joints]
     slowing_s = float(np.min(felt / np.maximum(robot.controller_gains["kd"], 1e-300)))
     return float(time / np.ceil(time / min(_SERVO_STEP_S, _SLOWED * slowing_s)))
@@ -114,13 +118,13 @@ def step_of_servos(robot: Robot) -> float:
 def bodies_and_chain(
     source: Path | str | Any, drives: DriveData, *, base: str | None = None, tip: str | None = None
 ) -> tuple[Tree, Chain]:
-    """Return what a model has, and the chain that is made of it; arguments as for `import_robot`."""
+    """Return the bodies of a model, and their serial chain; arguments and errors as in `import_robot`."""
     tree = _tree(Path(source)) if isinstance(source, str | Path) else tree_of(source)
     return tree, chain_of(tree, base or drives.base, tip or drives.tip)
 
 
 def _tree(path: Path) -> Tree:
-    """Return the bodies of a file, read as what it says it is."""
+    """Return the bodies of a file, in the format of its suffix or its root element."""
     if path.suffix.lower() in (".csv", ".toml"):
         return read_dh(path)
     root = read_xml(path)

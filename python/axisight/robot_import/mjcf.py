@@ -1,4 +1,4 @@
-"""MJCF through MuJoCo's own compiler: bodies, joints, armature, damping, dry friction."""
+"""Read MJCF with MuJoCo's own compiler: bodies, joints, armature, damping and dry friction."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ Array = NDArray[np.float64]
 
 
 def read_mjcf(root: Element, path: Path) -> Tree:
-    """Return the bodies of an MJCF file, whose root was read, as MuJoCo compiles it.
+    """Return the bodies of an MJCF file as MuJoCo compiles it; ``root`` is its root element.
 
-    Angles are MuJoCo's ``qpos``. What a serial chain cannot have is in the notes. Raises RobotError with file,
-    line and element, also for files outside the folder of the model, and MissingExtraError without MuJoCo.
+    Joint angles are MuJoCo's ``qpos``. Notes list what a serial chain cannot have. Raises RobotError with
+    file, line and element, also for files outside the folder of the model. Raises MissingExtraError if MuJoCo
+    is not installed.
     """
     elements = with_includes(root, path)
     return _Compiled(_compiled(path), elements, path).tree()
@@ -39,7 +40,7 @@ def _compiled(path: Path) -> Any:
 
 
 def _mujoco() -> Any:
-    """Return MuJoCo: only those who have such a file load it."""
+    """Return the module MuJoCo, imported only for MJCF files."""
     try:
         return import_module("mujoco")
     except ImportError as error:
@@ -59,7 +60,7 @@ class _Compiled:
         }
         worlds = [e.where for e in parts if e.tag == "worldbody"]
         self.world = worlds[0] if worlds else str(path)
-        # A free joint need not have a name: its body has one of them.
+        # A free joint may have no name, so it is looked up by the name of its body.
         self.free = {
             body.attributes.get("name", ""): joint.where
             for body in parts
@@ -73,7 +74,7 @@ class _Compiled:
         }
 
     def tree(self) -> Tree:
-        """Return its bodies, parents first, each joint one of its own."""
+        """Return the bodies, parents first; every joint is a body of its own."""
         model = self.model
         # The world is a body without a joint.
         bodies = {"world": Body("world", None, "", "fixed", still(), np.zeros(3), None, self.world)}
@@ -106,7 +107,7 @@ class _Compiled:
         return tree
 
     def _steps(self) -> Steps | None:
-        """Return the steps of the integrator; none of Runge-Kutta's, which are too exact to show."""
+        """Return the time steps of the integrator; None for Runge-Kutta, whose step error is negligible."""
         kinds, option = self.mujoco.mjtIntegrator, self.model.opt
         if option.integrator == kinds.mjINT_RK4:
             return None
@@ -116,7 +117,7 @@ class _Compiled:
         return Steps(option.timestep, -1, -1 if explicit else 1)
 
     def _model_name(self) -> str:
-        """Return the name of the model, that of the file without one."""
+        """Return the name of the model, or of the file if the model has none."""
         name = self.model.names.split(b"\0", 1)[0].decode()
         return name if name and name != "MuJoCo Model" else self.path.stem
 
@@ -131,7 +132,7 @@ class _Compiled:
         *,
         bare: bool,
     ) -> Body:
-        """Return the joint as a body without mass, at its anchor."""
+        """Return a joint as a massless body at its anchor."""
         model = self.model
         name, axis = self._name("joint", j), model.jnt_axis[j].copy()
         where = self._where("joint", name)
@@ -168,7 +169,7 @@ class _Compiled:
         else:
             drive = Drive()
         limits = tuple(map(float, model.jnt_range[j])) if model.jnt_limited[j] else None
-        # A second body of that name cannot be: MuJoCo's names have no such sign.
+        # The arrow makes the name unique, as names in MuJoCo cannot contain it.
         return Body(
             f"{body}\N{RIGHTWARDS ARROW}{name}",
             parent,
@@ -194,7 +195,7 @@ class _Compiled:
         return Mass(float(model.body_mass[i]), model.body_ipos[i].copy(), inertia)
 
     def _name(self, kind: str, i: int) -> str:
-        """Return the name of an element, ``<kind> <number>`` without one."""
+        """Return the name of an element, or ``<kind> <number>`` if it has none."""
         known = {
             "body": self.mujoco.mjtObj.mjOBJ_BODY,
             "joint": self.mujoco.mjtObj.mjOBJ_JOINT,
@@ -208,12 +209,12 @@ class _Compiled:
 
 
 def _rotation(quaternion: Array) -> Array:
-    """Return the rotation (3, 3) of a quaternion with the real part first."""
+    """Return the rotation (3, 3) of a quaternion (4,) with the real part first."""
     return np.asarray(Rotation.from_quat(np.roll(quaternion, -1)).as_matrix())
 
 
 def _moved(motion: Motion, axis: Array, by: float) -> Pose:
-    """Return the pose after a joint has moved by an angle [rad] or way [m]."""
+    """Return the pose after a joint has moved by an angle [rad] or a distance [m]."""
     if motion == "prismatic":
         return Pose(np.eye(3), by * axis)
     return Pose(Rotation.from_rotvec(by * axis).as_matrix(), np.zeros(3))

@@ -1,4 +1,4 @@
-"""Actuators of a compiled MJCF: which are motors or servos of one joint, and their numbers."""
+"""Actuators of a compiled MJCF: find the motors and servos of single joints, and their parameters."""
 
 from __future__ import annotations
 
@@ -11,46 +11,47 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Torque per command of what may still be a motor: others have commands that are no torques.
+# Range of torque per command in which an actuator may be a motor; outside it, commands are not torques.
 _GAINS = (0.2, 3.0)
-# Kinds of dynamics of actuators that are lags of first order, by MuJoCo's numbers.
+# MuJoCo's numbers of the actuator dynamics that are first-order lags.
 _FILTERS = (2, 3)
-# The kind of dynamics that adds commands up to a target.
+# MuJoCo's number of the dynamics that integrates commands to a target.
 _INTEGRATOR = 1
-# Kinds of transmissions to a joint: in the frame of the child or of the parent, the same for one axis.
+# MuJoCo's numbers of transmissions to a joint, in the child or the parent frame; equal for a single axis.
 _OF_JOINTS = (0, 1)
 
 
 def is_gain(value: float) -> bool:
-    """Whether a gain of an actuator may be that of a motor: torque per torque that is commanded."""
+    """Whether an actuator gain may be that of a motor, as torque per commanded torque."""
     return _GAINS[0] <= value <= _GAINS[1]
 
 
 def numbers(model: Any, name: str, usual: Any) -> Array:
-    """Return an array of a compiled model, ``usual`` where this MuJoCo does not know it yet."""
+    """Return an array of a compiled model, or ``usual`` if this version of MuJoCo does not have it."""
     return np.asarray(getattr(model, name, usual), dtype=np.float64)
 
 
 def limits_of(limited: Any, ranges: Any) -> Array:
-    """Return limits (n,) of ranges (n, 2): infinite without one, not a number where they are not alike both ways."""
+    """Return limits (n,) from ranges (n, 2): infinite if not limited, NaN if the range is not symmetric."""
     low, high = np.asarray(ranges, dtype=np.float64).T
     alike = np.where((high > 0) & (low == -high), high, np.nan)
     return np.asarray(np.where(np.asarray(limited, dtype=bool), alike, np.inf))
 
 
 class Actuators:
-    """The actuators of a compiled model, counted as MuJoCo does; ``joint`` (n,) is -1 for those of none.
+    """The n actuators of a compiled model, with MuJoCo's numbers.
 
-    ``gear``, ``armature`` [kg m^2], ``damping`` [Nm s/rad] (before the gear), ``delay`` [s], ``lag`` [s] and
-    ``gain`` (n,) are numbers of each; ``command_limit`` of its first command, ``force_limit`` before the gear
-    and ``joint_limit`` (njnt,) of all actuators of a joint, behind it, are as `limits_of` has them.
+    Arrays are (n,): ``joint`` is the number of the joint, -1 without one. ``gear``, ``armature`` [kg m^2],
+    ``damping`` [Nm s/rad] (before the gear), ``delay`` [s], ``lag`` [s] and ``gain`` are those of MuJoCo.
+    Limits are as from `limits_of`: ``command_limit`` of the first command, ``force_limit`` [Nm] before the
+    gear, and ``joint_limit`` (njnt,) [Nm] of all actuators of a joint together, after the gear.
     """
 
     def __init__(self, model: Any) -> None:
         self.model = model
         self.n = n = int(getattr(model, "nactuator", model.nu))
         every = np.arange(n)
-        # One may have several commands, and several outputs.
+        # An actuator may have several commands and outputs, so these have their own numbers.
         command = np.asarray(getattr(model, "actuator_ctrladr", every), dtype=int)
         output = np.asarray(getattr(model, "actuator_outadr", every), dtype=int)
         of_joint = np.isin(model.actuator_trntype, _OF_JOINTS)
@@ -71,16 +72,16 @@ class Actuators:
         self.joint_limit = limits_of(model.jnt_actfrclimited, model.jnt_actfrcrange)
 
     def is_motor(self, i: int) -> bool:
-        """Whether one is a source of torque: a gain about one, no bias, no state but that of a lag."""
+        """Whether actuator ``i`` is a source of torque: a gain near 1, no bias, no state except a lag."""
         model = self.model
         plain = model.actuator_gaintype[i] == 0 and model.actuator_biastype[i] == 0
         torque = is_gain(float(self.gain[i]))
         return bool(plain and torque and model.actuator_dyntype[i] in (0, *_FILTERS))
 
     def is_servo(self, i: int) -> bool:
-        """Whether one has a target of positions: ``kp (target - length) - kd speed``.
+        """Whether actuator ``i`` has position targets: ``kp (target - length) - kd speed``.
 
-        It is told the target, or the speed of it, which `sums_up`.
+        Its command is the target, or the speed of the target (`sums_up`).
         """
         kp, bias = self.gain[i], self.model.actuator_biasprm[i]
         law = bias[0] == 0 and bias[1] == -kp and bias[2] <= 0 and kp > 0
@@ -89,15 +90,15 @@ class Actuators:
         )
 
     def sums_up(self, i: int) -> bool:
-        """Whether the target of one is the sum of the speeds that it is told: its activation."""
+        """Whether actuator ``i`` integrates speed commands to its target, which is its activation."""
         return bool(self.model.actuator_dyntype[i] == _INTEGRATOR)
 
     def has_sum(self, j: int) -> bool:
-        """Whether an actuator of a joint sums up what it is told."""
+        """Whether any actuator of joint ``j`` integrates its commands."""
         return any(self.sums_up(i) for i in np.flatnonzero(self.joint == j).tolist())
 
     def is_speed_servo(self, i: int) -> bool:
-        """Whether one is told speeds: ``kv (target - speed)``, without a state of its own."""
+        """Whether actuator ``i`` has speed targets: ``kv (target - speed)``, without a state."""
         kv, bias = self.gain[i], self.model.actuator_biasprm[i]
         law = bias[0] == 0 and bias[1] == 0 and bias[2] == -kv and kv > 0
         return bool(self._is_affine(i) and law and self.model.actuator_dyntype[i] == 0)
@@ -107,7 +108,7 @@ class Actuators:
         return bool(model.actuator_gaintype[i] == 0 and model.actuator_biastype[i] == 1)
 
     def known(self) -> Mapping[int, list[int]]:
-        """Return the motors and servos of each joint that has any; one that is told speeds where it is the only one."""
+        """Return the motors and position servos by joint; a speed servo counts if it is the only actuator."""
         found: dict[int, list[int]] = {}
         joints = self.joint.tolist()
         for i, joint in enumerate(joints):
@@ -117,19 +118,22 @@ class Actuators:
         return found
 
     def drives_alone(self, i: int) -> bool:
-        """Whether one is the motor or servo by which its joint is taken."""
+        """Whether actuator ``i`` is the only motor or servo of its joint."""
         return bool(self.known().get(int(self.joint[i])) == [i])
 
     def of_one(self, values: Array) -> dict[int, float]:
-        """Return values of actuators by joint, of joints that one motor or servo drives."""
+        """Return the value of the actuator, by joint, for joints with a single motor or servo."""
         return {j: float(values[own[0]]) for j, own in self.known().items() if len(own) == 1}
 
     def ratios(self) -> dict[int, float]:
-        """Return the gear ratio of joints that one motor drives: one over its gear."""
+        """Return the gear ratio, by joint, for joints with a single motor or servo: 1 / ``gear``."""
         return {j: 1.0 / g for j, g in self.of_one(self.gear).items() if g != 0}
 
     def servos(self) -> dict[int, tuple[float, float]]:
-        """Return the gains of position and speed of joints whose only actuator has a target of positions."""
+        """Return the gains on position [Nm/rad] and speed [Nm s/rad], by joint, of position servos.
+
+        Only joints with a single actuator are included.
+        """
         joints = self.joint.tolist()
         return {
             joints[i]: (float(self.gain[i]), -float(self.model.actuator_biasprm[i, 2]))
@@ -138,7 +142,7 @@ class Actuators:
         }
 
     def speed_gains(self) -> dict[int, float]:
-        """Return the gains of joints whose only actuator is told speeds."""
+        """Return the gain [Nm s/rad], by joint, for joints whose only actuator is a speed servo."""
         known = self.known().items()
         return {
             j: float(self.gain[own[0]])
@@ -147,13 +151,14 @@ class Actuators:
         }
 
     def torque_path(self, j: int) -> tuple[float, float, float, float]:
-        """Return gain, limit [Nm], delay [s] and lag [s] of the motor of a joint; of a servo limit and delay.
+        """Return gain, limit [Nm], delay [s] and lag [s] of the motor of joint ``j``.
 
-        What one is told is late: of one that sums it up, its target is late already, and no delay follows it.
+        For a servo, gain and lag are 1 and 0. The delay acts on the command, so a servo that integrates its
+        commands has no delay after its target.
         """
         own = self.known().get(j, [])
         if len(own) != 1:
-            # Without a gear that is taken, a motor is on the side of the joint.
+            # The gear ratio is 1 here, so the joint-side limit is that of the motor.
             return 1.0, _least(self.joint_limit[j]) if j in self.joint else math.inf, 0.0, 0.0
         (i,) = own
         limit = self._limit_nm(i)
@@ -163,29 +168,32 @@ class Actuators:
         return 1.0, limit, float(self.delay[i]) if late else 0.0, 0.0
 
     def _limit_nm(self, i: int) -> float:
-        """Return the largest torque before the gear that the only actuator of a joint is told, or gives."""
+        """Return the largest torque [Nm], before the gear, of the only actuator of a joint.
+
+        For a motor it is the largest command, for a servo the largest torque.
+        """
         behind = self.force_limits(int(self.joint[i]))
         gear = abs(float(self.gear[i])) or 1.0
         given = _least(behind[0], behind[1] / gear)
         if not self.is_motor(i):
             return given
-        # A command is limited before the gain and the lag.
+        # The command limit acts before gain and lag, so a force limit is equivalent only without a lag.
         told = given / float(self.gain[i]) if self.lag[i] == 0 else math.inf
         return _least(self.command_limit[i], told)
 
     def force_limits(self, j: int) -> tuple[float, float]:
-        """Return the limits of the force of a joint's only actuator, before its gear, and of all that act on it."""
+        """Return two limits [Nm] of joint ``j``: of its only actuator, before the gear, and of the joint."""
         own = self.known().get(j, [])
         of_actuator = float(self.force_limit[own[0]]) if len(own) == 1 else math.inf
         return of_actuator, float(self.joint_limit[j]) if j in self.joint else math.inf
 
     def added(self, j: int) -> tuple[float, float]:
-        """Return inertia and damping that the actuators of a joint add to it, on its side: by the gear twice."""
+        """Return inertia [kg m^2] and damping [Nm s/rad] that actuators add to joint ``j``, joint-side."""
         own = self.joint == j
         squared = self.gear[own] ** 2
         return float(self.armature[own] @ squared), float(self.damping[own] @ squared)
 
 
 def _least(*limits: float) -> float:
-    """Return the least of limits that are numbers, infinite without any."""
+    """Return the smallest of the limits that are not NaN, infinite without any."""
     return min((float(x) for x in limits if not math.isnan(x)), default=math.inf)

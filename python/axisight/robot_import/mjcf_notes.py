@@ -1,4 +1,4 @@
-"""What an MJCF has beyond a serial chain with drives: said, not dropped."""
+"""Notes on everything in an MJCF that a serial chain with drives cannot have."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from axisight.robot_import.mjcf_actuators import Actuators, numbers
 
 Named = Callable[[str, int], str]
 
-# Kinds of transmissions that are none of one joint, by MuJoCo's numbers.
+# Transmissions that do not act on a single joint, by MuJoCo's numbers.
 _TRANSMISSIONS = {2: "a slider-crank", 3: "a tendon", 4: "a site", 5: "a body"}
 
 
 def notes_of(model: Any, name: Named) -> list[str]:
-    """Return what of a compiled model is left out; ``name`` says its elements by kind and number."""
+    """Return a note for everything in a compiled model that is left out; ``name`` gives names of elements."""
     actuators = Actuators(model)
     out = [
         f"actuator {name('actuator', i)!r}{note}"
@@ -44,7 +44,7 @@ def notes_of(model: Any, name: Named) -> list[str]:
 
 
 def _of_actuator(actuators: Actuators, i: int) -> list[str]:
-    """Return what of one actuator is left out, to stand behind its name."""
+    """Return what is left out of one actuator, as text to follow its name."""
     model = actuators.model
     if actuators.joint[i] < 0:
         kind = _TRANSMISSIONS.get(int(model.actuator_trntype[i]), "several axes")
@@ -65,7 +65,7 @@ def _of_actuator(actuators: Actuators, i: int) -> list[str]:
 
 
 def _of_law(actuators: Actuators, i: int, *, is_servo: bool) -> list[str]:
-    """Return what of the law of an actuator is left out, or to be known of it."""
+    """Return what is left out of the law of an actuator, or what users must know about it."""
     if is_servo and actuators.sums_up(i):
         out = [
             " is told speeds, which it sums up to its target: position_ref of logs is its activation (act), "
@@ -87,7 +87,7 @@ def _of_law(actuators: Actuators, i: int, *, is_servo: bool) -> list[str]:
 
 
 def _limits_out(actuators: Actuators, i: int, limit: float) -> str:
-    """Return why limits of the force of an actuator are left out, or of its joint; nothing where they are not."""
+    """Return why a force limit of an actuator or its joint is left out; "" if it is kept."""
     if np.isnan(limit):
         return ": expected the same both ways"
     if not actuators.drives_alone(i):
@@ -98,7 +98,7 @@ def _limits_out(actuators: Actuators, i: int, limit: float) -> str:
 
 
 def _limits_of_joint(actuators: Actuators, j: int) -> str:
-    """Return why limits of what acts on a joint are left out; nothing where they are not."""
+    """Return why the force limit of a joint is left out; "" if it is kept."""
     own = np.flatnonzero(actuators.joint == j).tolist()
     if not own:
         return ": no actuator acts on it"
@@ -108,7 +108,7 @@ def _limits_of_joint(actuators: Actuators, j: int) -> str:
 
 
 def _of_joints(actuators: Actuators, name: Named) -> list[str]:
-    """Return what of joints is left out."""
+    """Return notes on what is left out of joints."""
     out, model = [], actuators.model
     none = np.zeros((model.njnt, 1))
     springs = numbers(model, "jnt_stiffnesspoly", none)
@@ -131,7 +131,7 @@ def _of_joints(actuators: Actuators, name: Named) -> list[str]:
 
 
 def _of_bodies(model: Any, name: Named) -> list[str]:
-    """Return what of bodies is left out."""
+    """Return notes on what is left out of bodies."""
     held = np.flatnonzero(model.body_gravcomp).tolist()
     if not held:
         return []
@@ -142,5 +142,5 @@ def _of_bodies(model: Any, name: Named) -> list[str]:
 
 
 def _listed(name: Named, kind: str, which: Iterable[int]) -> str:
-    """Return names, each with the signs of a name."""
+    """Return the quoted names of elements, joined by commas."""
     return ", ".join(repr(name(kind, i)) for i in which)

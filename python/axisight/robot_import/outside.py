@@ -1,4 +1,4 @@
-"""Files that an MJCF file names: all have to lie in its folder, or they are not read."""
+"""Refuse MJCF files that refer to files outside their folder."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from axisight.arguments import shown
 from axisight.errors import RobotError
 from axisight.robot_import.xml_tree import Element, read_xml
 
-# Attributes of <compiler> that say where other files are.
+# Attributes of <compiler> that name folders of other files.
 _FOLDERS = ("meshdir", "texturedir", "assetdir")
-# Attributes that name files: of sides of a cube the last six.
+# Attributes that name files; the last six are the sides of a cube texture.
 _FILES = ("file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
 _DEEPEST = 20
 
 
 def with_includes(root: Element, path: Path) -> list[Element]:
-    """Return the root of a model file, which was read, and those of all that it includes.
+    """Return the root element of a model file and those of all included files, depth first.
 
-    Raises RobotError, with the line, for a file outside its folder, one that includes itself, and as
-    `read_xml`.
+    Raises RobotError, with the line, for a file outside the folder of ``path``, for a file that includes
+    itself, and as `read_xml`.
     """
     folder = path.resolve().parent
     return _checked(root, path, folder, [])
@@ -58,7 +58,7 @@ def _checked(root: Element, path: Path, folder: Path, above: list[Path]) -> list
 
 
 def _inside(element: Element, key: str, name: str, folder: Path) -> None:
-    """Raise RobotError unless a name means a file in a folder, links followed."""
+    """Raise RobotError unless a name, with links followed, leads to a place inside a folder."""
     target = (folder / name).resolve()
     if Path(name).is_absolute() or not target.is_relative_to(folder):
         raise RobotError(

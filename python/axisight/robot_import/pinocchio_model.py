@@ -1,4 +1,4 @@
-"""A ``pinocchio.Model``, whatever it was made from."""
+"""Read the bodies of a ``pinocchio.Model``."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Array = NDArray[np.float64]
 
 
 def tree_of(model: Any) -> Tree:
-    """Return the bodies of a ``pinocchio.Model``; angles are those of its configuration vector.
+    """Return the bodies of a ``pinocchio.Model``; joint angles are those of its configuration vector.
 
-    Rotors (``rotorInertia`` on the motor side, ``rotorGearRatio`` motor angle per joint angle), damping and
-    dry friction are taken along.
+    Drives have its rotors (``rotorInertia``, motor-side; ``rotorGearRatio``, motor angle per joint angle),
+    damping and dry friction. Raises RobotError for a joint placement that mirrors.
     """
     name = model.names[0]
     bodies = {name: Body(name, None, "", "fixed", still(), np.zeros(3), None, model.name)}
@@ -53,11 +53,11 @@ def _body(model: Any, i: int) -> Body:
 
 
 def _motion(joint: Any) -> tuple[Motion, Array]:
-    """Return how a joint moves, and its axis, by its motion subspace: linear above angular velocity."""
+    """Return motion and axis of a joint from its motion subspace (linear, then angular velocity)."""
     if joint.nv != 1 or joint.nq > 2:
         return "other", np.zeros(3)
     data = joint.createData()
-    # The zero of a continuous joint is written as a cosine and a sine.
+    # The configuration of a continuous joint is (cosine, sine).
     joint.calc(data, np.array([1.0, 0.0]) if joint.nq == 2 else np.zeros(1))
     along, about = np.split(np.asarray(data.S, dtype=np.float64).reshape(6), 2)
     turns, slides = bool(np.any(about)), bool(np.any(along))

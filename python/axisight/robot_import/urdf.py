@@ -1,4 +1,4 @@
-"""URDF: links, joints, what they say of drives. Meshes are never opened."""
+"""Read URDF: links, joints and drives; meshes are never opened."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _XACRO = "xacro:"
 
 
 def read_urdf(root: Element, path: Path) -> Tree:
-    """Return the bodies of a URDF file by its root; raises RobotError naming file, line and element."""
+    """Return the bodies of a URDF file from its root element; raise RobotError naming file, line, element."""
     unrun = next((e for e in root.walk() if e.tag.startswith(_XACRO)), None)
     if unrun is not None:
         raise RobotError(
@@ -48,7 +48,7 @@ def read_urdf(root: Element, path: Path) -> Tree:
 
 
 def _named(root: Element, tag: str) -> dict[str, Element]:
-    """Return the elements of a tag by name; raises RobotError where two share one."""
+    """Return the elements of a tag by name; raise RobotError if two share a name."""
     out: dict[str, Element] = {}
     for element in root.all(tag):
         name = element.require("name", f"the name of the {tag}")
@@ -61,7 +61,7 @@ def _named(root: Element, tag: str) -> dict[str, Element]:
 
 
 def _end(joint: Element, tag: str, links: dict[str, Element]) -> str:
-    """Return the link that a joint names as its parent or child."""
+    """Return the link that a joint names as its parent or child (``tag``); raise RobotError without it."""
     end = joint.find(tag)
     if end is None:
         raise RobotError(f"{joint.where}: expected <{tag} link=...>, got none")
@@ -72,7 +72,7 @@ def _end(joint: Element, tag: str, links: dict[str, Element]) -> str:
 
 
 def _above(joints: dict[str, Element], links: dict[str, Element]) -> dict[str, Element]:
-    """Return the joint that moves each link; raises RobotError where two move one: a closed loop."""
+    """Return the joint that moves each link; raise RobotError if two joints move one link (closed loop)."""
     seen: dict[str, Element] = {}
     for joint in joints.values():
         child = _end(joint, "child", links)
@@ -88,7 +88,7 @@ def _above(joints: dict[str, Element], links: dict[str, Element]) -> dict[str, E
 def _from_the_root(
     root: Element, links: dict[str, Element], above: dict[str, Element]
 ) -> list[str]:
-    """Return the links, parents before children; raises RobotError unless they are one tree."""
+    """Return the links, parents before children; raise RobotError unless they form one tree."""
     free = [name for name in links if name not in above]
     if len(free) != 1:
         got = "none, a closed loop" if not free else f"{len(free)}: {', '.join(free[:10])}"
@@ -155,7 +155,7 @@ def _body(
 
 
 def _pose(origin: Element | None) -> Pose:
-    """Return the pose that <origin> says: roll, pitch and yaw about fixed axes."""
+    """Return the pose of <origin>: roll, pitch and yaw [rad] about fixed axes; identity without it."""
     if origin is None:
         return still()
     roll, pitch, yaw = origin.numbers("rpy", 3, (0.0, 0.0, 0.0))
@@ -175,16 +175,16 @@ def _axis(joint: Element) -> Array:
     return axis / length
 
 
-# Moments below zero by no more than this, or than this of the largest, are a rounding of what computed
-# them: a milligramme a millimetre aside has a thousand times as much.
+# Negative moments down to this size, or this share of the largest, are rounding errors of the exporting tool.
+# A milligram at a distance of one millimetre has a thousand times as much.
 _ROUNDING_KG_M2 = 1e-15
 _ROUNDING = 1e-12
 
 
 def _mass(link: Element, notes: list[str]) -> Mass | None:
-    """Return what <inertial> says, None without it; raises RobotError for what no body has.
+    """Return the mass of <inertial>, None without it; raise RobotError for negative masses or moments.
 
-    Moments that are zero but for a rounding are zero, and added to the ``notes``.
+    Moments that are negative by a rounding error become zero, with an entry in ``notes``.
     """
     inertial = link.find("inertial")
     if inertial is None:

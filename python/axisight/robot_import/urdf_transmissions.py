@@ -1,4 +1,4 @@
-"""Gear ratios of a URDF: transmissions of ros_control, and those of ros2_control."""
+"""Read the gear ratios of a URDF from the transmissions of ros_control and ros2_control."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _CLASSIC, _ROS2 = "mechanicalReduction", "mechanical_reduction"
 
 
 def gear_ratios(root: Element, joints: Container[str]) -> tuple[dict[str, float], list[str]]:
-    """Return the gear ratio r of joints, one over their reduction, and what of transmissions is left out.
+    """Return the gear ratio r (1 / reduction) by joint, and notes on transmissions that are left out.
 
-    ``joints``: names of all there are. Raises RobotError for a reduction that is none.
+    ``joints`` are the names of all joints. Raises RobotError for a reduction that is zero or not a number.
     """
     ratios: dict[str, float] = {}
     notes: list[str] = []
@@ -25,7 +25,7 @@ def gear_ratios(root: Element, joints: Container[str]) -> tuple[dict[str, float]
         driven = [joint.require("name", "a joint") for joint in transmission.all("joint")]
         called = f"transmission {transmission.attributes.get('name', '')!r}"
         if len(driven) > 1:
-            # A differential or a linkage: no ratio of one axis.
+            # A differential or a linkage has no ratio for a single axis.
             names = ", ".join(map(repr, driven))
             notes.append(f"{called} drives several joints, {names}: their reductions left out")
             continue
@@ -47,12 +47,12 @@ def gear_ratios(root: Element, joints: Container[str]) -> tuple[dict[str, float]
 
 
 def _reduction(transmission: Element) -> tuple[float | None, bool]:
-    """Return the reduction of a transmission of one joint, None without any, and whether one has no effect."""
+    """Return the reduction of a transmission, or None, and whether its actuator states one without effect."""
     actuators, joints = transmission.all("actuator"), transmission.all("joint")
     classic = [x for holder in (*actuators, *joints) for x in holder.all(_CLASSIC)]
     of_joint = [x for joint in joints for x in joint.all(_ROS2)]
     of_actuator = [x for actuator in actuators for x in actuator.all(_ROS2)]
-    # ros2_control reads both and gears a simple transmission by that of its joint.
+    # ros2_control reads both, but a simple transmission uses only the reduction of its joint.
     ignored = any(_number(x) != 1.0 for x in of_actuator)
     found = [*of_joint, *classic]
     return (_number(found[0]) if found else None), ignored

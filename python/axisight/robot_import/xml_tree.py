@@ -1,4 +1,4 @@
-"""XML as plain elements that know their line. Nothing is expanded, and nothing else is read."""
+"""Read XML as plain elements with line numbers, without expanding entities or reading other files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _DEEPEST = 200
 
 @dataclass
 class Element:
-    """An element of a file, with the ``line`` and byte (``offset``) it starts at and the ``text`` it holds."""
+    """An element of a file, with its ``text`` and the ``line`` and byte (``offset``) at which it starts."""
 
     tag: str
     attributes: dict[str, str]
@@ -35,11 +35,11 @@ class Element:
         return f"{self.file}, line {self.line}, <{self.tag}{'' if name is None else f' {name!r}'}>"
 
     def all(self, tag: str) -> list[Element]:
-        """Return the children of that tag."""
+        """Return the children with a tag."""
         return [child for child in self.children if child.tag == tag]
 
     def find(self, tag: str) -> Element | None:
-        """Return the child of that tag, None without one; raises RobotError for several."""
+        """Return the child with a tag, None without one; raise RobotError for several."""
         found = self.all(tag)
         if len(found) > 1:
             raise RobotError(
@@ -48,13 +48,13 @@ class Element:
         return found[0] if found else None
 
     def walk(self) -> Iterator[Element]:
-        """Yield the element and all below it."""
+        """Yield the element and all its descendants, parents first."""
         yield self
         for child in self.children:
             yield from child.walk()
 
     def require(self, attribute: str, expected: str) -> str:
-        """Return the text of an attribute; raises RobotError where it is missing or empty."""
+        """Return the text of an attribute; raise RobotError if it is missing or empty."""
         text = self.attributes.get(attribute, "").strip()
         if not text:
             raise RobotError(f"{self.where}: expected {attribute}, {expected}, got none")
@@ -63,9 +63,10 @@ class Element:
     def numbers(
         self, attribute: str, count: int, default: tuple[float, ...] | None = None
     ) -> tuple[float, ...]:
-        """Return the finite numbers of an attribute; raises RobotError where it has others.
+        """Return the numbers of an attribute, or ``default`` if it is missing.
 
-        ``default`` where it is missing; without one it has to be there.
+        Raises RobotError unless there are ``count`` finite numbers, and for a missing attribute without a
+        default.
         """
         expected = "a number" if count == 1 else f"{count} numbers"
         if default is not None and attribute not in self.attributes:
@@ -80,15 +81,15 @@ class Element:
         return found
 
     def number(self, attribute: str, default: float | None = None) -> float:
-        """Return the finite number of an attribute; raises RobotError where it has none."""
+        """Return the number of an attribute; default and errors are those of `numbers`."""
         return self.numbers(attribute, 1, None if default is None else (default,))[0]
 
 
 def read_xml(path: Path) -> Element:
-    """Return the root of an XML file.
+    """Return the root element of an XML file.
 
-    Raises RobotError, with the line, for a file that cannot be read or is no XML, and for one with a document
-    type: entities are never expanded and nothing outside is read, so it says what it means itself.
+    Raises RobotError, with the line, for a file that cannot be read or is not XML. Raises RobotError for a
+    document type, because entities are never expanded and no other file is read.
     """
     try:
         with path.open("rb") as file:
@@ -101,7 +102,7 @@ def read_xml(path: Path) -> Element:
 
 
 def parse_xml(text: bytes, name: str) -> Element:
-    """Return the root of an XML text; ``name`` is the file in messages. Raises as `read_xml`."""
+    """Return the root element of an XML text; ``name`` is the file in messages; errors as in `read_xml`."""
     builder = _Builder(name)
     try:
         builder.parser.Parse(text, True)
@@ -127,7 +128,7 @@ class _Builder:
 
     @property
     def within(self) -> str:
-        """The element that is open, for messages; empty at the root."""
+        """The open element, as text for messages; empty at the root."""
         if not self._open:
             return ""
         name = self._open[-1].attributes.get("name")

@@ -503,6 +503,17 @@ def test_the_sample_time_may_come_from_elsewhere(tmp_path: Path):
     assert load_robot(path, sample_time_s=0.02).sample_time_s == 0.02
 
 
+def test_a_model_file_states_no_pose_unless_its_drive_data_do(tmp_path: Path):
+    path = written(tmp_path, URDF)
+    robot = import_robot(path)
+    assert not robot.states_operating_point
+    assert not Robot.from_toml(robot.toml).states_operating_point
+    assert not robot.with_torque_constants([None, None]).states_operating_point
+    stated = import_robot(path, drives=DriveData(operating_point=[0.0, 0.0]))
+    assert stated.states_operating_point
+    assert Robot.from_toml(stated.toml).states_operating_point
+
+
 def test_joints_that_cannot_be_at_zero_rest_in_the_middle(tmp_path: Path):
     text = changed(URDF, 'lower="-2" upper="2"', 'lower="1" upper="2"')
     assert import_robot(written(tmp_path, text)).operating_point.tolist() == [1.5, 0.0]

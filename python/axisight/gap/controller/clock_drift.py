@@ -44,11 +44,11 @@ def with_drift(log: Log, rate: float) -> Log:
 def drifting_clock(
     logs: Sequence[Log], stated: Array, shows: Array, missed: Missed
 ) -> AlgebraicCause | None:
-    """Return the drift of the machine's clock as a cause; None if it does not explain what the controller misses.
+    """Return the drift of the machine's clock as a cause; None if it does not explain the controller's error.
 
     ``stated`` (n_axes, n_logs): squared error of the torque that the controller of the robot file gives.
-    ``shows``, same shape: whether that error is above the noise. The drift has to explain 98 % of it on each of
-    these axes and logs.
+    ``shows``, same shape: whether that error is above the noise. The drift has to explain 98 % of it on each
+    of these axes and logs.
     """
     places = np.argwhere(shows)
     axis, log = max(places.tolist(), key=lambda at: float(stated[at[0], at[1]]))

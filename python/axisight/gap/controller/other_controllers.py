@@ -146,7 +146,10 @@ def is_continuous(robot: Robot) -> bool:
 
 @cache
 def _states_continuous(toml: str) -> bool:
-    """Whether a robot file states a continuous controller. Cached: it is asked for every log and axis."""
+    """Return whether a robot file states a continuous controller.
+
+    Cached, because every log and axis asks for it.
+    """
     return bool(tomllib.loads(toml).get("controller", {}).get("continuous"))
 
 
@@ -250,7 +253,7 @@ def _factors(pieces: Sequence[_Piece], lag_s: float) -> Array:
 def _best_lag(
     pieces: Sequence[_Piece], factors: Callable[[float], Array], damping: float = 0.0
 ) -> float:
-    """Return the lag of a filter [s] with the smallest squared error; ``factors``: of the gains, for a lag."""
+    """Return the lag of a filter [s] with the smallest squared error; ``factors``: gain factors for a lag."""
 
     def left(log_lag: float) -> float:
         lag = float(np.exp(log_lag))

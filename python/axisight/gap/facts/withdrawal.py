@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Contradiction = Literal["noise", "axis", "refit", "part", "fall", "bent", "none"]
+Contradiction = Literal["noise", "loud", "axis", "refit", "part", "fall", "bent", "none"]
 """What the validation logs contradict.
 
 | value | meaning |
 |---|---|
 | ``noise`` | the estimated noise is larger than the gap: the data have a fault |
+| ``loud`` | noise is so large a share of the torque that no gap would be clear |
 | ``axis`` | the causes of one axis do not shrink its gap |
 | ``refit`` | the causes leave more than the re-fit alone |
 | ``part`` | the causes remove a part of the gap, too little to be all |

@@ -56,7 +56,11 @@ def check_by_targets(
     *,
     despite: Collection[str] = (),
 ) -> tuple[Finding, ...]:
-    """Return all faults of logs with commands that show without a fit; ``despite`` as in :func:`check_inputs`."""
+    """Return all faults of logs with commands in place of torque that show without a fit.
+
+    ``despite`` as in :func:`check_inputs`. Raises InputError for a name that is no fault, or for a fault that
+    rules out any diagnosis.
+    """
     check_names(despite)
     logs = [*estimation, *validation]
     found = [f for f in check_machine(robot, logs) if f.name != "sample_time_differs"]
@@ -127,8 +131,9 @@ def _start_and_noise(robot: Robot, estimation: _Logs, validation: _Logs) -> list
 def check_fit_inputs(robot: Robot | None, logs: Sequence[Log]) -> tuple[Finding, ...]:
     """Return the faults of logs for a fit without a simulator of the machine.
 
-    Like `check_inputs`, for each log alone, copies among the logs, and the gears of a robot file if there is
-    one. Logs may have another sample time than the robot, but not in ms or us.
+    The checks are those of `check_inputs` that need no simulator: each log alone, copies among the logs, and
+    the gears of a robot file if one is given. The sample time of logs may differ from the robot's, but not by
+    a unit (ms or us).
     """
     found = [] if robot is None else check_machine(robot, logs)
     out = [f for f in found if f.name != "sample_time_differs"]

@@ -150,8 +150,8 @@ def overlays(
     squares = zip(*(s.per_log() for s in stages), strict=True)
     for log, before, after, (given, left) in zip(logs, *simulated, squares, strict=True):
         step = max(1, log.n_samples // _OVERLAY_POINTS)
-        # The filtered measured torque, from which errors are computed, not the raw log: both sides pass the same
-        # filter.
+        # Both sides of the comparison pass the same filter, so the figure shows the filtered torque, not the
+        # raw log.
         measured, counted = view.measured(log), view.counted(log)
         std = np.std(log.torque_nm, axis=0)
         out += [

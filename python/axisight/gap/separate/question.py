@@ -30,9 +30,10 @@ class Turn:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Mean squares (n_axes,) of one run: ``left`` by the other model, and ``there`` without the effects in question.
+    """What a motion shows about a truth: mean squares (n_axes,) of the residual of one run.
 
-    ``samples``: number of residuals of an axis.
+    ``left``: with the other model fitted. ``there``: without the effects in question. ``samples``: number of
+    residuals of an axis.
     """
 
     left: Array
@@ -45,7 +46,7 @@ class Question(Protocol):
 
     @property
     def turns(self) -> Sequence[Turn]:
-        """The possible truths, each with the model that must be told from it."""
+        """The possible truths, each with the model that the experiment must tell from it."""
 
     @property
     def axes(self) -> tuple[int, ...]:
@@ -53,7 +54,7 @@ class Question(Protocol):
 
     @property
     def enough(self) -> float:
-        """The worth of a motion from which it answers the question."""
+        """The worth at which a motion answers the question."""
 
     def worth(self, seen: Sequence[Seen], repeats: int = 1) -> float:
         """Return the worth of a motion with this many runs, from what it shows for each possible truth."""

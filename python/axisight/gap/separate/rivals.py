@@ -49,7 +49,7 @@ class Rivals:
 
     @property
     def turns(self) -> tuple[Turn, Turn]:
-        """Each of the two as the machine; without its last effect, the other explains nothing of the question."""
+        """The two truths: each model once as the machine, with the other model fitted to its run."""
         one, other = self.models
         return _turn(one, other), _turn(other, one)
 

@@ -154,7 +154,7 @@ def _shapes(sample_time_s: float, seed: int, widest_hz: float) -> Mapping[str, A
     steps = np.repeat([1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0, 0.0], n // 8)
     louder = np.repeat([0.1, 0.1, 0.3, 0.3, 0.3, 1.0, 1.0, 1.0], n // 8) * out["a multisine"]
     out |= {
-        # Multisines ride on a square wave. How dry friction acts on a motor that trembles around rest is uncertain, so
+        # Multisines ride on a square wave. The friction of a motor that trembles around rest is uncertain, so
         # such data have little weight.
         "a wide multisine": _unit(_unit(wide) + flat),
         "a multisine of high frequencies": _unit(_unit(high) + flat),

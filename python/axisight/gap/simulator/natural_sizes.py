@@ -1,7 +1,7 @@
-"""Natural sizes of effects on a robot: how large an amplitude must be to be large there, by its unit.
+"""Natural sizes of effects on a robot: the amplitude that is large on this robot, by its unit.
 
-The table of effects states sizes for large robots. On a small robot, such a friction would throw the simulator
-off any log, and a derivative with that step would be useless.
+The table of effects states sizes for large robots. On a small robot, such a friction would throw the
+simulator off any log, and a derivative with that step would be useless.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from axisight.robot import Robot
 # Natural size, as a share of the torque, inertia or mass of an axis, like the production scatter of parameters.
 # With 25 %, a small torque in quiet logs of slow motions is 1000 times the noise, and would count as chaos.
 _SHARE = 0.02
-# Samples between the two angles of a speed, so many that their noise does not matter.
+# Samples between the two angles of a speed; over that many, noise of the angles does not matter.
 _APART = 20
 
 

@@ -84,7 +84,7 @@ def nominal_values(robot: Robot) -> dict[str, float]:
 
 
 def nominal_and_size(robot: Robot, name: str) -> tuple[float, float]:
-    """Return the nominal value of a parameter by name, and the size that its changes are relative to."""
+    """Return the nominal value of a parameter by name, and the size to which its changes are relative."""
     place = _places(robot).get(name)
     if place is None:
         value = robot_parameters(robot)[name]

@@ -1,4 +1,4 @@
-"""The pose where each simulation starts, if logs of one robot start at different poses."""
+"""The pose where each simulation starts, if logs start at different poses, or the robot states none."""
 
 from __future__ import annotations
 
@@ -19,23 +19,24 @@ OFFSET_RAD = 0.02
 # Iterations for the start angle. Gravity deflection changes little with the pose: each step leaves 1 % of the
 # error.
 _STEPS = 3
-SAYS = (
-    "the logs begin at different poses: each is simulated from its own, where its first position is"
-)
+SAYS = "each log is simulated from the pose where it begins: poses differ, or the robot file states none"
 
 
 def at_their_poses(robot: Robot, logs: Sequence[Log]) -> list[Log]:
-    """Return logs with the joint angles where their simulations start, if they start at different poses.
+    """Return logs with the joint angles where their simulations start, if that is not the operating point.
 
-    Motors count as at rest at the first sample. Logs stay unchanged if all start at one pose (away from the
-    operating point, that is a finding of the gate), or if the robot has no controller and is not simulated
-    along them. A log with a run-up keeps the start that this has.
+    It is not where logs start at different poses, or away from an operating point that the robot does not state.
+    All logs at one pose away from a stated operating point are a finding of the gate instead. Motors count as at
+    rest at the first sample. Logs stay unchanged if the robot has no controller: it is not simulated along them.
+    A log with a run-up keeps the start that this has.
     """
     if robot.controller_kind == "none" or any(log.n_axes != robot.n_axes for log in logs):
         # The gate refuses logs of another robot by name.
         return list(logs)
-    begins = np.array([log.position_rad[0] for log in logs if log.run_up is None])
-    apart = np.ptp(begins, axis=0) * np.abs(robot.gear_ratio) if len(begins) else np.zeros(1)
+    begins = [log.position_rad[0] for log in logs if log.run_up is None]
+    if begins and not robot.states_operating_point:
+        begins.append(robot.equilibrium()["motor_angle_rad"].values)
+    apart = np.ptp(begins, axis=0) * np.abs(robot.gear_ratio) if begins else np.zeros(1)
     if not np.any(apart > OFFSET_RAD):
         return list(logs)
     return [

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.gap.facts.axis_names import hides_all
 from axisight.gap.facts.compared_quantity import torque_of
 from axisight.gap.facts.result import Gap
 from axisight.gap.facts.settings import Settings
@@ -54,6 +55,7 @@ def carried_over(
     | causes of the size of noise | they do not shrink it, and no log stands above the floor | *none* |
     | *none* | a log stands above the floor | *unknown* |
     | anything | the estimated noise is larger than a gap that is seen | *unknown* |
+    | anything | noise alone is so large a share of the torque that no gap would be clear | *unknown* |
 
     - ``own``: causes that are judged on their own axes alone; they must shrink the gap there.
     - ``bent``: share of the own parameters at the edge of their tolerance in the fit with the causes.
@@ -64,6 +66,8 @@ def carried_over(
     labels = tuple(cause.label for cause in conclusion.causes)
     if gap.refitted > _SEEN and gap.floor > _ABSURD * gap.refitted:
         withdrawn = Withdrawal("noise", gap.before, gap.refitted, gap.floor)
+    elif hides_all(gap.floor):
+        withdrawn = Withdrawal("loud", gap.before, gap.refitted, gap.floor)
     elif own is not None:
         # Another motion may show more of what no effect explains, and as much of the causes.
         withdrawn = _no_fall_there(own, stages, names, conclusion)
@@ -87,6 +91,11 @@ def carried_over(
 
 
 def _advice(withdrawn: Withdrawal) -> str:
+    if withdrawn.why == "loud":
+        return (
+            "Lower the cutoff of the comparison (--cutoff-hz), record larger motions, or log positions with a "
+            "finer resolution."
+        )
     if withdrawn.why == "noise":
         return (
             "Run `axisight check` on the logs. Look for glitches and for frozen or missing samples."

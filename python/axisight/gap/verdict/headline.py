@@ -87,8 +87,9 @@ class Facts:
 
 def headline(facts: Facts) -> str:
     """Return the verdict in a few plain sentences, axes with the names of their joints."""
-    if facts.withdrawn is not None and facts.withdrawn.why == "noise":
-        said = _no_verdict(facts)
+    why = None if facts.withdrawn is None else facts.withdrawn.why
+    if why in ("noise", "loud"):
+        said = _no_verdict(facts, loud=why == "loud")
     elif facts.verdict == "none":
         said = _none(facts)
     elif facts.verdict == "unknown":
@@ -114,9 +115,14 @@ def clear_changes(refit: Mapping[str, Interval]) -> list[str]:
     return changes if len(largest) <= MOST else [*changes, f"and {len(largest) - MOST} more"]
 
 
-def _no_verdict(facts: Facts) -> list[str]:
-    """Of noise that is larger than the gap: a fault of the data."""
+def _no_verdict(facts: Facts, *, loud: bool) -> list[str]:
+    """Of noise that is larger than the gap, a fault of the data, or as large as the torque."""
     gap = facts.gap
+    if loud:
+        return [
+            f"{NO_VERDICT}: noise alone is {percent(gap.floor)} of the {_torque(facts)}.",
+            "No effect would show above it.",
+        ]
     return [
         f"{NO_VERDICT}: the noise estimated from the logs, {percent(gap.floor)} of the {_torque(facts)}, is larger "
         f"than the gap of {percent(gap.refitted)}.",

@@ -215,8 +215,8 @@ def records_of(tracking: Robot, logs: Sequence[Log], weighting: Weighting) -> li
 
 # Longest start or end of a log that does not count, as a share of the log.
 _MOST_FORGOTTEN = 0.25
-# End of a log that does not count if positions come in steps [s], for the same reason as `_MIRRORED_S`: the
-# error of a position there is at least half a step.
+# End of a log that does not count if positions come in steps [s]. The weighting mirrors the error at the end
+# too, and the error of a position there is at least half a step.
 _END_S = 0.5
 
 

@@ -55,7 +55,7 @@ class InverseView(View):
     """Compares the measured torque with that predicted from the measured motion."""
 
     feels_steps: ClassVar[bool] = False
-    """False: what the loop makes of encoder steps is in torque and motion alike.
+    """False: torque and motion both contain the loop's response to encoder steps.
 
     The low-pass removes the rest.
     """
@@ -116,7 +116,7 @@ class InverseView(View):
     def candidates(
         self, model: FittedModel, *, axes: Collection[int] | None = None
     ) -> list[Hypothesis]:
-        """Return the candidates of `View` whose turn it is beside the causes of ``model``."""
+        """Return the candidates of `View` that `_is_tried` allows beside the causes of ``model``."""
         return [f for f in super().candidates(model, axes=axes) if _is_tried(f.effect, model)]
 
     def measured(self, log: Log) -> Array:

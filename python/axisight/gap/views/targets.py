@@ -170,7 +170,7 @@ class TargetsView(View):
         ]
 
     def run(self, variant: Variant, log: Log) -> tuple[Array, Array]:
-        """Return the same torque on one log, and the simulated position [rad], (n, n_axes) each."""
+        """Return torque [Nm] as in `torques` and simulated position [rad] on one log, (n, n_axes) each."""
         (position,) = simulated_positions(self.robot, variant, [log])
         return log.torque_nm + self._as_torque(self.off_by(position, log)), position
 

@@ -54,7 +54,7 @@ class View(ABC):
     shown: tuple[AlgebraicCause, ...] = ()
     """Causes that the logs show without a fit."""
     unfelt: tuple[AlgebraicCause, ...] = ()
-    """The same, for causes that do not change the compared torque."""
+    """Causes that the logs show without a fit, and that do not change the compared torque."""
     not_offered: frozenset[str] = frozenset()
     """Labels of effects that the logs decide without a fit; they are no candidates."""
 

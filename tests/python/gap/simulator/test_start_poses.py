@@ -103,6 +103,21 @@ def test_logs_of_one_pose_are_left_alone(robot: Robot) -> None:
         replace(several[0], start_rad=np.zeros(2))
 
 
+def test_a_robot_without_a_stated_pose_starts_where_its_logs_do(robot: Robot) -> None:
+    """The same logs are left alone where the pose is stated: then it is the encoder that may be off."""
+    logs = logs_at(robot, np.repeat(POSES[1:2], 2, axis=0), [])
+    free = robot.without_stated_pose()
+    assert not free.with_parameters({}).states_operating_point
+    found = starts_of(free, at_their_poses(free, logs))
+    assert found is not None
+    assert np.abs(np.array(found) - POSES[1]).max() < 1e-5
+    # Logs that begin at the operating point need no start of their own.
+    rest = logs_at(robot, np.repeat(np.array([robot.operating_point]), 2, axis=0), [])
+    assert starts_of(free, at_their_poses(free, rest)) is None
+    stated = free.with_operating_point(robot.operating_point)
+    assert starts_of(stated, at_their_poses(stated, logs)) is None
+
+
 def test_residuals_are_those_of_a_robot_that_starts_there(robot: Robot) -> None:
     """Two logs in four lanes against each alone, of a robot whose operating point is its pose."""
     name = next(n for n in robot.parameters() if n.endswith("stiffness"))

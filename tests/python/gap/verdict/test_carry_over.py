@@ -144,6 +144,16 @@ def test_noise_larger_than_the_gap_is_a_fault_of_the_data():
     assert "axisight check" in (found.next_experiment or "")
 
 
+@pytest.mark.parametrize("noise", [0.5, 0.7])
+def test_noise_as_large_as_the_torque_allows_no_verdict(noise):
+    """From two thirds of the torque on not even a gap of all of it would stand half above the noise."""
+    found = judged(named(), stages(1.2, noise, noise=noise))
+    assert (found.withdrawn is not None and found.withdrawn.why == "loud") == (noise > 2 / 3)
+    if found.withdrawn is not None:
+        assert found.verdict == "unknown"
+        assert found.next_experiment.startswith("Lower the cutoff")
+
+
 def test_a_gap_that_nobody_sees_is_below_whatever_noise():
     """A simulation diagnosed by itself: sharp motions pass for noise, and nothing is missing."""
     nothing = replace(named(), verdict="none", causes=(), effects=())

@@ -348,6 +348,14 @@ SITUATIONS: dict[str, tuple[Facts, str]] = {
         "No verdict: the noise estimated from the logs, 90 % of the torque, is larger than the gap of 50 %. Look "
         "for glitches and for frozen or missing samples with `axisight check`.",
     ),
+    "noise as large as the torque": (
+        replace(
+            UNKNOWN,
+            gap=gap(whole=(1.24, 1.24, 0.98, 1.16)),
+            withdrawn=Withdrawal("loud", 1.24, 1.24, 1.16),
+        ),
+        "No verdict: noise alone is 116 % of the torque. No effect would show above it.",
+    ),
     "none": (
         NONE,
         "No unmodelled effect found. The re-fitted simulator leaves 3.86 % of the torque on validation logs "

@@ -6,13 +6,17 @@ sign. Energy does: the motor's work beyond that on the simulator's bodies must b
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.facts.faults import Finding
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from axisight.gap.signals.motion import Motion
+from axisight.gap.signals.noise import white_std
 from axisight.logs import Log
+from axisight.logs.quality import quantization
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -21,23 +25,52 @@ Array = NDArray[np.float64]
 # log lowers also gives a negative share, as large as the share of gravity that the load adds; 30 % does not reach
 # the limit.
 _DRIVES = -0.5
+# Travel of an axis in steps of its encoder, or standard deviations of its noise, from which its work is known. On
+# an axis that creeps over a few counts, torque and speed agree by chance.
+_TRAVELS = 100.0
 
 
-def check_passive(robot: Robot, log: Log, at: Motion) -> list[Finding]:
-    """Return findings about axes whose friction seems to drive; ``at``: low-passed motion and torque."""
+def check_passive(robot: Robot, logs: Sequence[Log], motions: Sequence[Motion]) -> list[Finding]:
+    """Return findings about axes whose friction seems to drive, over all logs and in each of them.
+
+    ``motions``: low-passed motion and torque of each log. A spring to a wall, or a load, may do net work on an
+    axis in one log; a wrong sign shows in all.
+    """
+    shares = [_net_work(robot, log, at) for log, at in zip(logs, motions, strict=True)]
+    net, scale = (np.sum(x, axis=0) for x in zip(*shares, strict=True))
+    in_all = np.all([work <= 0.0 for work, _ in shares], axis=0)
+    share = net / np.maximum(scale, 1e-300)
+    return [
+        _finding(axis, share[axis]) for axis in np.flatnonzero(in_all & (share < _DRIVES)).tolist()
+    ]
+
+
+def _net_work(robot: Robot, log: Log, at: Motion) -> tuple[Array, Array]:
+    """Return the net work on the friction of each axis, and all work in either direction, (n_axes,) [J].
+
+    Both are zero on axes that stand.
+    """
     bodies = predict(_without_friction(robot), at)
-    power = (at[3] - bodies) * at[1]
-    scale = np.abs(at[3] * at[1]).sum(axis=0)
-    share = power.sum(axis=0) / np.maximum(scale, 1e-300)
-    out = []
-    for axis in np.flatnonzero(share < _DRIVES).tolist():
-        message = (
-            f"expected friction that brakes, got friction that drives the axis ({100 * share[axis]:.3g} % of the "
-            "work done). Change the sign of its torque or of its position"
-        )
-        column = f"torque_cmd_{axis + 1}"
-        out.append(Finding("sign_flipped", "refuse", message, log.name, axis + 1, column))
-    return out
+    scale = np.maximum(np.abs(at[3] * at[1]).sum(axis=0), np.abs(bodies * at[1]).sum(axis=0))
+    net = ((at[3] - bodies) * at[1]).sum(axis=0)
+    seconds = log.duration_s / len(at[1])
+    moves = _travels(log)
+    return np.where(moves, net, 0.0) * seconds, np.where(moves, scale, 0.0) * seconds
+
+
+def _travels(log: Log) -> NDArray[np.bool_]:
+    """Return which axes travel enough to be judged, (n_axes,)."""
+    steps = [found.step if (found := quantization(x)) else 0.0 for x in log.position_rad.T]
+    fine = np.maximum(steps, white_std(log.position_rad, log.sample_time_s))
+    return np.asarray(np.ptp(log.position_rad, axis=0) > _TRAVELS * fine)
+
+
+def _finding(axis: int, share: float) -> Finding:
+    message = (
+        f"expected friction that brakes, got friction that drives the axis in all logs ({100 * share:.3g} % of the "
+        "work done). Change the sign of its torque or of its position"
+    )
+    return Finding("sign_flipped", "refuse", message, None, axis + 1, f"torque_cmd_{axis + 1}")
 
 
 def _without_friction(robot: Robot) -> Robot:

@@ -9,9 +9,16 @@ from numpy.typing import NDArray
 
 from axisight.gap.facts.faults import Finding, GateSeverity, refused
 from axisight.gap.gate.by_dynamics.friction_sign import check_passive
+from axisight.gap.gate.by_dynamics.gravity_share import check_gravity_share
 from axisight.gap.gate.by_dynamics.small_errors import check_small_errors
 from axisight.gap.gate.by_dynamics.torque_fit import TorqueFit, torque_fit
-from axisight.gap.gate.by_dynamics.undone_mistakes import Mistake, gravity_turned, predict, undone
+from axisight.gap.gate.by_dynamics.undone_mistakes import (
+    GRAVITY,
+    Mistake,
+    predict,
+    undone,
+    with_gravity,
+)
 from axisight.gap.signals.lowpass_cutoff import highest_cutoff_hz
 from axisight.gap.signals.motion import Motion, motion
 from axisight.gap.signals.unit_scales import scale_name
@@ -50,11 +57,16 @@ _FASTEST_RAD_S = 3000.0
 def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     """Return findings about logs whose torques the simulator's inverse dynamics should explain."""
     motions = [thinned(log) for log in logs]
-    out = []
+    out = check_gravity_share(robot, [at for _, at in motions])
+    if refused(out):
+        return out
     for log, (_, at) in zip(logs, motions, strict=True):
         out += _one_log(robot, log, at)
-    if any(f.name == "gravity_flipped" for f in out) and not _gravity_off(robot, motions):
-        out = [f for f in out if f.name != "gravity_flipped"]
+    for name in GRAVITY:
+        if any(f.name == name for f in out) and not _gravity_off(robot, motions, name):
+            out = [f for f in out if f.name != name]
+    if not refused(out):
+        out += check_passive(robot, logs, [at for _, at in motions])
     return out if refused(out) else [*out, *check_small_errors(robot, motions)]
 
 
@@ -76,7 +88,7 @@ def _one_log(robot: Robot, log: Log, at: Motion) -> list[Finding]:
         found = _most_likely(robot, at, given)
         if found is not None:
             return [_named(log, found, given)]
-    return [*check_passive(robot, log, at), *_scales(robot, log, given)]
+    return _scales(robot, log, given)
 
 
 def _too_fast(robot: Robot, log: Log, at: Motion) -> list[Finding]:
@@ -106,11 +118,12 @@ def _most_likely(robot: Robot, at: Motion, given: TorqueFit) -> Mistake | None:
     return best if enough and explains else None
 
 
-def _gravity_off(robot: Robot, motions: Sequence[tuple[float, Motion]]) -> bool:
-    """Whether gravity with the other sign explains all logs in which gravity matters."""
+def _gravity_off(robot: Robot, motions: Sequence[tuple[float, Motion]], name: str) -> bool:
+    """Whether gravity as the mistake ``name`` has it explains all logs in which gravity matters."""
+    _, factor = GRAVITY[name]
     for _, at in motions:
         given = torque_fit(at[3], predict(robot, at), at).total
-        removed = given - gravity_turned(robot, at).total
+        removed = given - with_gravity(robot, at, factor).total
         if abs(removed) > _LEAST_REMOVED and removed < _REMOVED * given:
             return False
     return True

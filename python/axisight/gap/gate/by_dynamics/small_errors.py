@@ -84,7 +84,7 @@ def _effects(
     step = max(1, round(_STEP_S / sample_time_s))
     seconds = step * sample_time_s
     names: list[tuple[str, int]] = [("time_shifted", -1)]
-    # A torque that is s late is the torque s earlier.
+    # A torque that is late by s equals the torque s earlier.
     effects = [-np.gradient(torque, sample_time_s, axis=0)]
     rate = np.gradient(base, sample_time_s, axis=0)
     for i in range(n):

@@ -13,7 +13,7 @@ import numpy as np
 from axisight.gap.facts.faults import Finding
 from axisight.gap.gate.by_dynamics.inverse_checks import thinned
 from axisight.gap.gate.by_dynamics.torque_fit import TorqueFit, torque_fit
-from axisight.gap.gate.by_dynamics.undone_mistakes import predict
+from axisight.gap.gate.by_dynamics.undone_mistakes import predict, undone
 from axisight.gap.signals.motion import Motion
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -43,7 +43,17 @@ def check_turned_axes(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     pairs = list(zip(given, turned[axis], strict=True))
     worse = any(fit.total > g.total + _NO_WORSE for g, fit in pairs)
     told = [(log, g, fit) for log, (g, fit) in zip(logs, pairs, strict=True) if _explains(g, fit)]
-    return [] if worse or not told else [_named(axis, *told[0])]
+    if worse or not told or _another_explains(robot, motions, sum(fit.total for _, fit in pairs)):
+        return []
+    return [_named(axis, *told[0])]
+
+
+def _another_explains(robot: Robot, motions: Sequence[Motion], left: float) -> bool:
+    """Whether another single mistake, undone in all logs, leaves less than the turned axis."""
+    return any(
+        sum(mistake.fit.total for mistake in in_all) < left
+        for in_all in zip(*(undone(robot, at) for at in motions), strict=True)
+    )
 
 
 def _turned(robot: Robot, at: Motion, axis: int) -> TorqueFit:

@@ -26,6 +26,15 @@ _UNITS = {
 # Smallest logarithm of a gear ratio for which the two sides of the gear differ.
 _GEARED = 0.1
 
+GRAVITY = {
+    "gravity_flipped": ("change the sign of gravity in the robot file", -1.0),
+    "torque_without_gravity": (
+        "set gravity to zero in the robot file, or log the torque with gravity",
+        0.0,
+    ),
+}
+"""Mistakes of gravity: what undoes them in words, and the factor of the simulator's gravity that does."""
+
 
 @dataclass(frozen=True)
 class Mistake:
@@ -42,13 +51,13 @@ class Mistake:
 
 
 def undone(robot: Robot, at: Motion) -> Iterator[Mistake]:
-    """Yield each single mistake, undone: swapped and turned columns, units, gravity."""
+    """Yield each single mistake, undone: swapped and turned columns, units, gravity. The order is always the same."""
     position, speed, acceleration, torque = at
     n = robot.n_axes
     given = predict(robot, at)
 
     def moved(factor: Array | float, order: Sequence[int] | slice = slice(None)) -> TorqueFit:
-        """Fit with columns in another order, then multiplied."""
+        """Return the fit with columns in the given order, multiplied by ``factor``."""
         p, v, a = (x[:, order] * factor for x in (position, speed, acceleration))
         return torque_fit(torque, predict(robot, (p, v, a, torque)), (p, v, a, torque))
 
@@ -73,9 +82,8 @@ def undone(robot: Robot, at: Motion) -> Iterator[Mistake]:
     if np.any(np.abs(np.log(np.abs(robot.gear_ratio))) > _GEARED):
         words = "divide by the gear ratios"
         yield Mistake("position_joint_side", "position", every, words, moved(1 / robot.gear_ratio))
-    yield Mistake(
-        "gravity_flipped", "gravity", every, "change the sign of gravity", gravity_turned(robot, at)
-    )
+    for name, (words, turns) in GRAVITY.items():
+        yield Mistake(name, "gravity", every, words, with_gravity(robot, at, turns))
 
 
 def predict(robot: Robot, at: Motion) -> Array:
@@ -84,8 +92,8 @@ def predict(robot: Robot, at: Motion) -> Array:
     return predicted_torque(robot, AS_GIVEN, (position, speed, acceleration, torque))
 
 
-def gravity_turned(robot: Robot, at: Motion) -> TorqueFit:
-    """Fit with gravity of the other sign: the prediction minus twice the torque at zero speed."""
+def with_gravity(robot: Robot, at: Motion, factor: float) -> TorqueFit:
+    """Fit with gravity times a factor: the prediction with another multiple of the torque at zero speed."""
     still = np.zeros_like(at[1])
     weight = predict(robot, (at[0], still, still, at[3]))
-    return torque_fit(at[3], predict(robot, at) - 2.0 * weight, at)
+    return torque_fit(at[3], predict(robot, at) + (factor - 1.0) * weight, at)
