@@ -136,6 +136,10 @@ def _explained(
                 "the time stamps do not show; export the log again, with its own time stamps"
             ),
             "rows_shuffled": "got rows out of order; sort them by the time they were taken at",
+            "position_spike": (
+                f"got {_count_spikes(members)} single samples far off; replace them by their neighbours' mean, or "
+                "record one source alone if two write to this channel"
+            ),
             "position_jumps": (
                 f"got {len(members)} jumps of this axis alone, of {abs(first.size):.4g}: a counter "
                 "was reset or lost steps; cut the log there"
@@ -145,7 +149,7 @@ def _explained(
             f"expected a motion, {words} (first at {first.index * sample_time_s:.4g} s on "
             f"axis {first.axis + 1})"
         )
-        axis = first.axis + 1 if name == "position_jumps" else None
+        axis = first.axis + 1 if name.startswith("position_") else None
         findings.append(Finding("error", labels["position", first.axis], message, name, axis))
     return findings
 
@@ -181,6 +185,8 @@ def _name_of(event: list[Jump], tops: Mapping[int, float], positions: Mapping[in
     places = {j.index for j in event}
     axes = {j.axis for j in event}
     signs = {np.sign(j.size) for j in event if j.axis == event[0].axis}
+    if all(_there_and_back([j for j in event if j.axis == axis]) for axis in axes):
+        return "position_spike"
     if len(places) >= _OUT_OF_ORDER and len(signs) == 2:
         return "rows_shuffled"
     if all(j.size * j.speed < 0 for j in event):
@@ -189,6 +195,19 @@ def _name_of(event: list[Jump], tops: Mapping[int, float], positions: Mapping[in
     return (
         "position_jumps" if len(axes) == 1 and _alone(event[0], tops, positions) else "rows_missing"
     )
+
+
+def _there_and_back(jumps: list[Jump]) -> bool:
+    """Whether jumps of one axis come in pairs, from one sample to the next, of which the second undoes the first."""
+    pairs = list(zip(jumps[::2], jumps[1::2], strict=False))
+    return len(jumps) % 2 == 0 and all(
+        b.index == a.index + 1 and abs(a.size + b.size) < _SHARE_OF_JUMP * abs(a.size)
+        for a, b in pairs
+    )
+
+
+def _count_spikes(events: list[list[Jump]]) -> int:
+    return sum(len({j.index for j in event}) // 2 for event in events)
 
 
 def _alone(jump: Jump, tops: Mapping[int, float], positions: Mapping[int, Floats]) -> bool:

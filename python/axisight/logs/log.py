@@ -20,6 +20,8 @@ from axisight.logs.run_up import RunUp
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from axisight.logs.recorded import RecordedRows
+
 Floats = NDArray[np.float64]
 AxisKind = Literal["revolute", "prismatic"]
 
@@ -65,7 +67,8 @@ class Log:
     still the current (A). For other axes it is None; it may be empty if no axis is of this kind.
 
     `period_s` is the excitation's period (s) when it is periodic. `notes` says what reading changed
-    (time grid replaced, resampled). Raises InputError when shapes disagree.
+    (time grid replaced, resampled). `recorded` has the rows before they were resampled; None if they were not.
+    Raises InputError when shapes disagree.
     """
 
     name: str
@@ -86,6 +89,7 @@ class Log:
     axis_kinds: tuple[AxisKind, ...] = ()
     notes: tuple[str, ...] = ()
     nominal_nm_a: tuple[float | None, ...] = ()
+    recorded: RecordedRows | None = None
 
     def __post_init__(self) -> None:
         """Check the shapes and fill in revolute axes."""
@@ -240,6 +244,7 @@ class Log:
             start_rad=self.start_rad if first == 0 else None,
             run_up=self.run_up if first == 0 else None,
             period_s=self.period_s if periodic else None,
+            recorded=None if self.recorded is None else self.recorded.part(start, stop),
             notes=(*self.notes, note),
         )
 

@@ -14,6 +14,7 @@ from axisight.logs.gather import Gathered, gather
 from axisight.logs.grid import Grid, make_grid
 from axisight.logs.log import Floats, Log, not_logged
 from axisight.logs.map_files import AnyMap
+from axisight.logs.recorded import recorded_rows
 from axisight.logs.sources_lerobot import is_lerobot
 from axisight.logs.validate import check_axes, check_finite, check_lengths
 
@@ -150,6 +151,9 @@ def _assemble(found: Gathered, grid: Grid) -> Log:
         ),
         notes=(*grid.notes, *found.notes, *found.doubts),
         nominal_nm_a=_nominal(found),
+        recorded=None
+        if grid.stamps_s is None
+        else recorded_rows(grid.stamps_s, found.signals, found.labels),
     )
 
 

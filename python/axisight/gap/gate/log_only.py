@@ -58,7 +58,9 @@ def check_log_alone(log: Log) -> list[Finding]:
     # References are chosen, not measured: they may be constant or have few levels.
     measured = {c: x for c, x in signals.items() if c[0] not in _REFERENCE}
     looked = look_at_signals(measured, labels, slides)
-    if not log.is_resampled:  # interpolation causes steps and rests of its own
+    if log.recorded is not None:
+        looked += log.recorded.findings()
+    elif not log.is_resampled:  # interpolation causes steps and rests of its own
         looked += check_rows(measured, labels, log.sample_time_s)
     out = [named(f, log) for f in looked if f.severity != "ok" and f.name]
     return [
