@@ -48,13 +48,14 @@ class Plainer:
     """The plainer ``law`` that an effect contains, and the parameters that the effect ``adds`` to that law.
 
     If the logs do not show the added parameters, the plainer law is ``likelier`` by this factor. ``shown``
-    says how the logs show them: by their standard errors, or by friction that rises at low speed.
+    says how the logs show them: by the standard errors of all, or of at least one (``"either"``, two sides of one
+    wave), or by friction that rises at low speed.
     """
 
     law: str
     adds: tuple[str, ...]
     likelier: float
-    shown: Literal["sizes", "rise"]
+    shown: Literal["sizes", "either", "rise"]
 
     @property
     def by_rise(self) -> bool:

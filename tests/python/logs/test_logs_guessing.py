@@ -290,7 +290,7 @@ def test_targets_errors_and_the_tool_are_told_from_measurements(tmp_path):
     assert "accelerations" in reasons["acc_1"]
     assert "tool" in reasons["tau_ext_1"]
     assert "tool" in reasons["tcp_speed_1"]
-    assert reasons["comment"] == "no numbers"
+    assert reasons["comment"] == "no numbers: row 1 is 'x'"
     assert set(reasons) >= {"torque_cmd_1"}
     assert all(name in found.text for name in found.unused)
 
@@ -482,3 +482,23 @@ def test_the_stamps_of_the_bench_are_in_us(shared_data, tmp_path):
     assert (found.columns.time.unit, found.columns.sample_rate_hz) == ("us", "fs")
     assert "a bound, by its name" in found.unused["omega_max"]
     assert '# torque = { name = "iq_adx", unit = "A", scale = ... }' in found.text
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ("time,position_1,torque_1\n[s],[deg],[Nm]\n", "position_1 (no numbers: row 1 is '[deg]')"),
+        ('time,q,tau\n0.0,"[0.0, 1.0]","[2.0, 3.0]"\n', "q (no numbers: row 1 is '[0.0, 1.0]')"),
+        (
+            "stamp,q,tau\n2024-05-01 12:00:00.000,0.0,1.0\n",
+            "stamp (no numbers: row 1 is '2024-05-01",
+        ),
+    ],
+)
+def test_columns_of_texts_are_named_with_their_first_text(tmp_path, rows, said):
+    path = tmp_path / "run.csv"
+    path.write_text(rows + rows.splitlines()[-1] + "\n")
+    with pytest.raises(LogError) as refused:
+        guess_columns(path)
+    assert said in str(refused.value)
+    assert str(refused.value).endswith("write one number into each cell")

@@ -1,7 +1,7 @@
 //! Dry friction that changes with the position of the axis.
 
 use super::sides::{ARM_SHARE, Friction, on_sides};
-use super::{Absorber, Acts, BegunFrom, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, Mark, ParameterInfo, Prior, Role, SMOOTHING};
+use super::{Absorber, Acts, BegunFrom, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, Mark, ParameterInfo, Plainer, Prior, Role, SMOOTHING, Shown};
 use axisight_scalar::Scalar;
 
 const fn wave(name: &'static str) -> ParameterInfo {
@@ -27,6 +27,12 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     absorbed_by: &[Absorber::DryFriction],
     shown_by: &[Experiment::Poses],
     formula: Formula::FRICTION,
+    plainer: Some(Plainer {
+        law: "coulomb_friction",
+        adds: &["cosine_nm", "sine_nm"],
+        likelier: 10.0,
+        shown: Shown::Either,
+    }),
     law_of: Some(LawOf::DryFriction),
     // This law contains uniform friction, so its fit must not leave a larger loss than that law.
     begun_from: Some(BegunFrom {

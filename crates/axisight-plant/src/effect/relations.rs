@@ -6,6 +6,8 @@
 pub enum Shown {
     /// By the standard errors of the added parameters, relative to their sizes.
     Sizes,
+    /// By the standard error of at least one of them: they are the two sides of one wave.
+    Either,
     /// By the rise of friction at some speed above its value at high speed.
     Rise,
 }

@@ -42,17 +42,17 @@ def _law(**shares: float) -> Callable[[StartContext], Hypothesis]:
         top = max(float(np.abs(x[trial.index].speed_rad_s).max()) for x in trial.at.turning) or 1.0
         found = {name: share * top for name, share in shares.items()}
         values = {p.name: p.neutral for p in trial.info.parameters} | found
-        bounds = {name: (0.1 * value, 10 * value) for name, value in found.items()}
+        # All laws of dry friction may turn equally sharply.
+        bounds = {k: (0.1 * min(v, _SMOOTHING * top), 10 * v) for k, v in found.items()}
         starts = ({BEHIND_GEAR: 1.0},) if BEHIND_GEAR in values else ()
         return Hypothesis(trial.effect(values), tuple(values), bounds=bounds, starts=starts)
 
     return start
 
 
-# Shares of an axis's top speed: the smoothing of dry friction around zero speed, and the Stribeck speed.
+# Shares of top speed: the smoothing of dry friction around zero speed, and the Stribeck speed.
 _SMOOTHING, _STRIBECK = 0.003, 0.1
-# Shares of the top speed for further starts of the Stribeck speed: by grease and load it lies between 0.001 and 0.1 of
-# the top speed, and higher in slow motions.
+# Further starts of the Stribeck speed, as shares of the top speed: 0.001 to 0.1 by grease and load; more if slow.
 _STRIBECK_STARTS = (0.003, 0.01, 0.03, 0.3)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from axisight.errors import InputError
+from axisight.fitting.simulation_error import is_closed_loop
 from axisight.gap.controller.speed_loop import as_speed_loop
 from axisight.gap.facts.compared_quantity import Compared
 from axisight.gap.facts.faults import Finding
@@ -15,6 +16,7 @@ from axisight.gap.gate import pass_gate, pass_gate_by_targets
 from axisight.gap.intake import user_simulator
 from axisight.gap.intake.start_of_logs import from_rest
 from axisight.gap.prepare.currents import Nominal, in_torques
+from axisight.gap.prepare.held_commands import HeldCommands, held_commands, where_they_act
 from axisight.gap.prepare.position_targets import Commanded, with_commands
 from axisight.gap.prepare.reconstructed_references import SAYS, with_references
 from axisight.gap.prepare.stiff_bristles import with_bristles_followed
@@ -37,6 +39,7 @@ class PreparedLogs:
     - ``nominal``: the constants with which currents of unknown torque constants were read.
     - ``simulator``: how well the robot reproduces the user's own simulator, once that has been compared.
     - ``beside``: logs of the user's own simulator, cut like the measured ones.
+    - ``held``: by how much torques act later than they were logged, where that was corrected.
     """
 
     robot: Robot
@@ -48,6 +51,7 @@ class PreparedLogs:
     nominal: tuple[Nominal, ...] = ()
     simulator: Reproduction | None = None
     beside: tuple[Log, ...] = ()
+    held: HeldCommands | None = None
 
     def view(self, settings: Settings) -> View:
         """Return the comparison of simulator and logs."""
@@ -110,6 +114,7 @@ class PreparedLogs:
             "" if self.simulator is None else user_simulator.said(self.simulator, compared),
             FROM_OWN_POSES if own_poses and mode == "closed_loop" else "",
             SAYS if self.recovered else "",
+            "" if self.held is None else self.held.says(),
         ]
         return tuple(filter(None, said))
 
@@ -147,6 +152,10 @@ def behind_gate(
     recovered = with_references(robot, logs)
     logs = logs if recovered is None else recovered
     noted = (*found, *noted)
+    # Logs of the user's own simulator may hold their commands, too: the difference of both is compared.
+    inverse = commanded is None and not beside and not is_closed_loop(robot, logs)
+    held = held_commands(robot, logs) if inverse else None
+    logs = logs if held is None else where_they_act(logs, held)
     return PreparedLogs(
         robot,
         logs[:n],
@@ -156,4 +165,5 @@ def behind_gate(
         recovered is not None,
         read.nominal,
         beside=tuple(beside),
+        held=held,
     )

@@ -5,6 +5,7 @@ A richer law can fit small differences between formulas with numbers that mean n
 - Presliding and Stribeck friction fit the rounded corner of dry friction.
 - A gear with a knee outside the deflections seen is a gear of another stiffness.
 - A cable of low stiffness that is stretched far pulls like a constant torque.
+- A wave of friction over the position, of an order that the travel does not resolve, is a constant.
 
 If the addition is real, its parameter has a small standard error, or friction falls with speed.
 """
@@ -56,7 +57,8 @@ def _is_plain(plainer: Plainer, fit: FittedModel, stretch: NDArray[np.int64]) ->
     """Whether the data show nothing of what a fitted law adds to its plainer law."""
     if plainer.by_rise:
         return rise_over_high_speed(fit.effects[-1]) < _RISES
-    return any(own_error(fit, added, stretch) > _UNKNOWN for added in plainer.adds)
+    unknown = [own_error(fit, added, stretch) > _UNKNOWN for added in plainer.adds]
+    return all(unknown) if plainer.shown == "either" else any(unknown)
 
 
 def own_error(fitted: FittedModel, name: str, stretch: NDArray[np.int64]) -> float:

@@ -9,7 +9,7 @@ from pathlib import Path
 from axisight.errors import LogError
 from axisight.logs.columns import CsvOptions
 from axisight.logs.guessing.families import Axis, Family
-from axisight.logs.guessing.series import Series
+from axisight.logs.guessing.series import TEXTS, Series
 from axisight.robot import Robot
 
 _SHOWN = 60
@@ -49,10 +49,13 @@ class Draft:
     doubts: list[str] = field(default_factory=list)
 
     def refusal(self, message: str) -> LogError:
-        """Return a LogError with ``message`` and the columns of the file."""
+        """Return a LogError with ``message``, the columns of the file, and those that hold texts instead of numbers."""
         listed = ", ".join(self.names[:_SHOWN]) or "none"
         more = f" and {len(self.names) - _SHOWN} more" if len(self.names) > _SHOWN else ""
-        return LogError(f"{self.path}: {message}; columns: {listed}{more}")
+        texts = [f"{k} ({why})" for k, why in self.unused.items() if why.startswith(TEXTS)]
+        said = f"; texts are no signals: {', '.join(texts[:_SHOWN])}" if texts else ""
+        remedy = ". Leave out rows of units, and write one number into each cell" if texts else ""
+        return LogError(f"{self.path}: {message}; columns: {listed}{more}{said}{remedy}")
 
     def leave(self, families: Iterable[Family], reason: str) -> None:
         """Note why families are not used; an earlier reason stays."""

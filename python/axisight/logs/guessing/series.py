@@ -10,10 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.arguments import shown
 from axisight.logs.log import Floats
 
 # A matrix with more signals than this does not hold signals of axes.
 _MOST = 32
+
+
+TEXTS = "no numbers"
+"""First words of the reason why a column of texts is no signal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +52,7 @@ def series_of(arrays: Mapping[str, NDArray[Any]]) -> tuple[list[Series], dict[st
         if values.ndim == 0 or values.size <= 1:
             other[name] = "one value, no signal"
         elif numbers is None:
-            other[name] = "no numbers"
+            other[name] = _texts(values)
         elif n not in values.shape or values.ndim > 2:
             other[name] = f"of shape {values.shape}, where signals have {n} samples"
         elif values.ndim == 1:
@@ -60,6 +65,17 @@ def series_of(arrays: Mapping[str, NDArray[Any]]) -> tuple[list[Series], dict[st
                 one = numbers[:, k] if across else numbers[k]
                 found.append(Series(name, one, f":,{k}" if across else f"{k},:", k))
     return found, other
+
+
+def _texts(values: NDArray[Any]) -> str:
+    """Return why values are no numbers: the first row that holds a text, counted from 1 below the header."""
+    for row, value in enumerate(values.ravel().tolist(), start=1):
+        try:
+            float(value)
+        except (TypeError, ValueError):
+            if value is not None:
+                return f"{TEXTS}: row {row} is {shown(value)}"
+    return TEXTS
 
 
 def _numbers(values: NDArray[Any]) -> Floats | None:

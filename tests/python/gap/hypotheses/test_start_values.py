@@ -9,7 +9,7 @@ from axisight import Effect, Settings
 from axisight.effects import effect_info
 from axisight.gap.hypotheses.ripple_orders import Turning
 from axisight.gap.hypotheses.start_context import StartContext, StartData
-from axisight.gap.hypotheses.start_values import STARTS
+from axisight.gap.hypotheses.start_values import STARTS, TARGET_STARTS
 from axisight.gap.screening.screening import Screening, ScreeningModel
 from axisight.gap.views.closed_loop import ClosedLoopView
 from gap_data import bare_axis, logs_of
@@ -100,3 +100,17 @@ def test_uneven_friction_is_looked_for_at_its_wave():
     gains = [screen.starts([one])[0].gain for one in orders]
     assert gains[0] > 0.9 * gains[1] > 0.85 * explainable
     assert gains[2] < gains[0]
+
+
+@pytest.mark.parametrize("table", [STARTS, {**STARTS, **TARGET_STARTS}])
+def test_no_law_of_dry_friction_may_turn_more_sharply_than_another(table):
+    """Else a richer law wins by a sharper reversal alone, whatever it adds."""
+    turn = Turning(np.ones(8), np.zeros(8), np.full(8, 50.0), 1e-3)
+    at = StartData([[turn]], lambda *_: np.zeros(0), np.zeros(1))
+    robot = bare_axis()
+    log = logs_of(robot, [], PLAN)[0]
+    least = set()
+    for law in ("coulomb_friction", "asymmetric_friction", "stribeck_friction"):
+        start = table[law](StartContext(effect_info(law), 1, robot, [log], at))
+        least.add(start.bounds["smoothing_rad_s"][0])
+    assert len(least) == 1

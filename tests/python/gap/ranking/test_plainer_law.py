@@ -129,3 +129,17 @@ def test_a_knee_that_is_not_known_is_another_stiffness(unsure, monkeypatch):
     fits = [SimpleNamespace(effects=[one]) for one in (softer, knee)]
     found = held_to_plainer([softer, knee], fits, np.array([-3.0, 2.0, -5.0]), np.zeros(1, int))
     assert found[1] == pytest.approx(2.0 if unsure is None else -3.0 - np.log(10.0))
+
+
+@pytest.mark.parametrize("known", [(), ("cosine_nm",), ("sine_nm",), ("cosine_nm", "sine_nm")])
+def test_a_wave_that_is_not_known_is_even_friction(known, monkeypatch):
+    """One side of the wave is enough: its phase decides which."""
+    monkeypatch.setattr(
+        "axisight.gap.ranking.plainer_law.own_error",
+        lambda _fit, name, _at: 0.1 if name in known else 2.0,
+    )
+    even = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5})
+    uneven = Effect("position_dependent_friction", 1, {"mean_nm": 0.5, "sine_nm": 1e-3})
+    fits = [SimpleNamespace(effects=[one]) for one in (even, uneven)]
+    found = held_to_plainer([even, uneven], fits, np.array([-3.0, 2.0, -5.0]), np.zeros(1, int))
+    assert found[1] == pytest.approx(2.0 if known else -3.0 - np.log(10.0))

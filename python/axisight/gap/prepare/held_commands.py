@@ -1,0 +1,131 @@
+"""Puts held commands on the clock of the motion, where torques of a rigid arm are compared by inverse dynamics.
+
+A command is held from one sample to the next: on average it acts half a sample later than it is logged. By inverse
+dynamics a shift s acts like viscous friction, of about -w^2 M s for an inertia M at an angular frequency w. Unlike
+friction it follows the rate of the torque, and is the same on all axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.gap.gate.by_dynamics.inverse_checks import thinned
+from axisight.gap.gate.by_dynamics.torque_fit import nuisance
+from axisight.gap.gate.by_dynamics.undone_mistakes import predict
+from axisight.gap.signals.motion import Motion
+from axisight.logs import Log
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Largest time [samples] by which a command acts later than it is logged, with the error of an estimate. A torque
+# that is logged late is not corrected: an elastic gear looks alike on all axes.
+_MOST_SAMPLES = 1.1
+# Smallest significance of the shift [standard errors], and of an axis that has to agree with the others.
+_SIGNIFICANT, _TELLS = 10.0, 3.0
+# Largest difference between the shift of an axis and the common one, relative to that one or, with _TELLS, to its
+# error. An effect that the simulator lacks on some axes seems to shift these axes alone.
+_ALIKE = 0.35
+# Number of parts of each log whose scatter gives the standard error.
+_PARTS = 10
+
+
+@dataclass(frozen=True)
+class HeldCommands:
+    """How much later torques act than they are logged [s], on all axes; ``sample_time_s`` of the logs [s]."""
+
+    acts_later_s: float
+    sample_time_s: float
+
+    def says(self) -> str:
+        """Return the sentence for the checks of a verdict."""
+        samples = self.acts_later_s / self.sample_time_s
+        return (
+            f"On all axes, torques act {1e3 * self.acts_later_s:.3g} ms ({samples:.2g} samples) later than they are "
+            "logged, as commands do that are held for a sample. They are compared where they act."
+        )
+
+
+def held_commands(robot: Robot, logs: Sequence[Log]) -> HeldCommands | None:
+    """Return by how much the torques of a rigid arm act later than logged; None where no such time is seen.
+
+    ``logs``: of one sample time. At least two axes must tell, and those that do must agree: on a single axis the
+    time cannot be told from an effect that the simulator lacks.
+    """
+    rigid = all(robot.axis_is_rigid) and robot.n_axes > 1
+    if not rigid or not all(log.has_torque for log in logs):
+        return None
+    cells = np.array([cell for log in logs for cell in _cells(robot, log)])
+    shifts = [_slope(cells[:, axis]) for axis in range(robot.n_axes)]
+    own_s, error_s = (np.array(x) for x in zip(*shifts, strict=True))
+    weight = np.where(error_s > 0.0, 1.0 / np.maximum(error_s, 1e-12) ** 2, 0.0)
+    if not weight.any():
+        return None
+    later_s = float(weight @ own_s / weight.sum())
+    least_s = _SIGNIFICANT / float(np.sqrt(weight.sum()))
+    if not least_s <= later_s <= _MOST_SAMPLES * logs[0].sample_time_s:
+        return None
+    tell = (error_s > 0.0) & (later_s >= _TELLS * error_s)
+    alike = np.abs(own_s - later_s) <= np.maximum(_ALIKE * later_s, _TELLS * error_s)
+    agreed = tell.sum() > 1 and alike[tell].all()
+    return HeldCommands(later_s, logs[0].sample_time_s) if agreed else None
+
+
+def where_they_act(logs: Sequence[Log], held: HeldCommands) -> list[Log]:
+    """Return the logs with the torques that act at each sample."""
+    samples = held.acts_later_s / held.sample_time_s
+    return [replace(log, torque_nm=_delayed(log.torque_nm, samples)) for log in logs]
+
+
+def _delayed(x: Array, samples: float) -> Array:
+    """Return signals (n, n_axes) that come so many ``samples`` later, with the spectrum of their noise.
+
+    A line between samples would take noise off the upper part of the band, from which the floor is estimated.
+    Between its ends, joined by a line, a signal is continued as an odd one: values and rates have no jump there.
+    """
+    n = len(x)
+    place = np.linspace(0.0, 1.0, n)[:, None]
+    slope = x[-1] - x[0]
+    odd = x - x[0] - slope * place
+    periodic = np.concatenate([odd, -odd[-2:0:-1]])
+    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(len(periodic))[:, None] * samples)
+    moved = np.fft.irfft(np.fft.rfft(periodic, axis=0) * turn, len(periodic), axis=0)[:n]
+    return np.asarray(moved + x[0] + slope * (place - samples / (n - 1)))
+
+
+def _cells(robot: Robot, log: Log) -> list[Array]:
+    """Return product and energy of the torques' rate on what the simulator leaves, (n_axes, 2) for each part."""
+    sample_time_s, at = thinned(log)
+    base = predict(robot, at)
+    pairs = [_rate_and_left(at, base, axis, sample_time_s) for axis in range(robot.n_axes)]
+    rates, lefts = (np.column_stack(x) for x in zip(*pairs, strict=True))
+    parts = zip(np.array_split(rates, _PARTS), np.array_split(lefts, _PARTS), strict=True)
+    return [np.column_stack([(c * x).sum(axis=0), (c * c).sum(axis=0)]) for c, x in parts]
+
+
+def _rate_and_left(at: Motion, base: Array, axis: int, sample_time_s: float) -> tuple[Array, Array]:
+    """Return the rate of an axis' torque, and what is left of it, over the torque's scatter, (n,) each.
+
+    The torque is fitted by a share of the prediction, friction and an offset. The rate is that of the fitted torque:
+    noise of the measured one would make the shift seem smaller.
+    """
+    torque = at[3][:, axis]
+    basis, _ = np.linalg.qr(np.column_stack([base[:, axis], nuisance(at[1][:, axis])]))
+    fitted = basis @ (basis.T @ torque)
+    rate = np.gradient(fitted, sample_time_s)
+    scale = max(float(torque.std()), 1e-300)
+    return (rate - basis @ (basis.T @ rate)) / scale, (torque - fitted) / scale
+
+
+def _slope(cells: Array) -> tuple[float, float]:
+    """Return a shift and its standard error [s] from products and energies (..., 2), by their scatter."""
+    product, energy = cells[..., 0], cells[..., 1]
+    total = float(energy.sum())
+    if not total > 0.0:
+        return 0.0, 0.0
+    slope = float(product.sum()) / total
+    return slope, float(np.sqrt(((product - slope * energy) ** 2).sum())) / total

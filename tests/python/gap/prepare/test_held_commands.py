@@ -1,0 +1,112 @@
+"""Commands that are held act half a sample after they are logged: the time is found on an arm, and corrected."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from axisight import Robot, diagnose
+from axisight.gap.prepare.held_commands import HeldCommands, held_commands, where_they_act
+from rigid_arm import RATE_HZ, arm, arm_toml, log_of
+
+STEP_S = 2 / RATE_HZ
+
+
+def held(log, samples: int = 1, axes=slice(None)):
+    """Return every second row, with the torques of ``axes`` that act ``samples`` rows of the log later."""
+    torque = log.torque_nm.copy()
+    torque[:-samples, axes] = log.torque_nm[samples:, axes]
+    return replace(
+        log,
+        sample_time_s=STEP_S,
+        time_s=log.time_s[: len(log.time_s) // 2] * 2,
+        torque_nm=torque[::2],
+        position_rad=log.position_rad[::2],
+    )
+
+
+def robot() -> Robot:
+    return Robot.from_toml(
+        arm_toml().replace(f"sample_time = {1 / RATE_HZ}", f"sample_time = {STEP_S}")
+    )
+
+
+def logs(n: int = 3, **kind):
+    return [held(log_of(arm(), seed, seconds=30.0), **kind) for seed in range(1, n + 1)]
+
+
+def test_half_a_sample_is_found():
+    """Within a tenth: friction reverses with another formula, so that its rate is that of a similar torque."""
+    found = held_commands(robot(), logs())
+    assert found is not None
+    assert found.acts_later_s == pytest.approx(STEP_S / 2, rel=0.1)
+    assert "samples) later than they are logged" in found.says()
+
+
+def test_torques_on_the_clock_of_the_motion_are_left_alone():
+    plain = [log_of(arm(), seed, seconds=30.0) for seed in (1, 2, 3)]
+    assert held_commands(arm(), plain) is None
+    # The shift of the corrected logs is gone.
+    found = held_commands(robot(), logs())
+    assert found is not None
+    assert held_commands(robot(), where_they_act(logs(), found)) is None
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        {"axes": [1]},
+        {"axes": [0, 1, 2]},
+        # Three samples are no command that is held.
+        {"samples": 6},
+    ],
+    ids=["one axis", "half the axes", "too far"],
+)
+def test_what_is_no_held_command_is_left_alone(kind):
+    assert held_commands(robot(), logs(**kind)) is None
+
+
+def test_torques_that_are_late_are_left_alone():
+    """An elastic gear looks like a late torque, on all axes alike."""
+    found = HeldCommands(-STEP_S / 2, STEP_S)
+    assert held_commands(robot(), where_they_act(logs(), HeldCommands(STEP_S, STEP_S))) is None
+    assert found.acts_later_s < 0
+
+
+def test_elastic_arms_are_left_alone():
+    gear = 'motion = "revolute"\nstiffness = 1e5\ndamping = 10.0'
+    elastic = Robot.from_toml(robot().toml.replace('motion = "revolute"', gear))
+    assert not all(elastic.axis_is_rigid)
+    assert held_commands(elastic, logs()) is None
+
+
+def test_torques_are_taken_from_where_they_act():
+    """A line is moved to rounding, a wave between the ends to 1e-3, and noise keeps its size at all frequencies."""
+    log = logs(1)[0]
+    held_s = HeldCommands(0.3 * STEP_S, STEP_S)
+
+    def moved(signal):
+        (out,) = where_they_act([replace(log, torque_nm=np.tile(signal[:, None], 6))], held_s)
+        return out.torque_nm[:, 0]
+
+    time = log.time_s
+    np.testing.assert_allclose(
+        moved(3.0 * time + 1.0), 3.0 * (time - 0.3 * STEP_S) + 1.0, atol=1e-9
+    )
+    wave = moved(np.sin(5.0 * time) + 2.0 * time)
+    inner = slice(20, -20)
+    expected = np.sin(5.0 * (time - 0.3 * STEP_S)) + 2.0 * (time - 0.3 * STEP_S)
+    np.testing.assert_allclose(wave[inner], expected[inner], atol=1e-3)
+    noise = np.random.default_rng(1).normal(size=len(time))
+    assert np.diff(moved(noise), n=2).std() == pytest.approx(np.diff(noise, n=2).std(), rel=0.02)
+
+
+def test_friction_of_held_commands_is_not_too_small():
+    """Half a sample of 20 ms takes about w^2 M T / 2 off viscous friction."""
+    viscous = (0.0, 12.0, 0.0, 0.0, 0.0, 0.0)
+    kept = [held(log_of(arm(), seed, (0.0,) * 6, viscous, seconds=30.0)) for seed in (1, 2, 3, 4)]
+    said = diagnose(robot=robot(), estimation=kept[:3], validation=kept[3:])
+    assert [c.label for c in said.causes] == ["viscous_friction@2"]
+    value = said.causes[0].parameters["viscous_nm_s_rad"]
+    assert value.low <= 12.0 <= value.high
+    assert any("held for a sample" in check for check in said.checks)
