@@ -48,6 +48,7 @@ class Robot:
         self.core = core
         self._torque_constants: tuple[float | None, ...] = (None,) * core.n_axes
         self._states_pose = True
+        self._imported_from: Path | None = None
 
     def _with_core(self, core: _core.Robot) -> Robot:
         """Return a robot with another core and what the core does not hold."""
@@ -312,10 +313,15 @@ class Robot:
         out._states_pose = True
         return out
 
-    def without_stated_pose(self) -> Robot:
-        """Return the same robot with an operating point that nobody stated; see `states_operating_point`."""
+    @property
+    def imported_from(self) -> Path | None:
+        """The model file whose import this robot is, with nothing added or changed since; else None."""
+        return self._imported_from
+
+    def as_imported(self, source: Path | None, *, states_pose: bool) -> Robot:
+        """Return the same robot with its `imported_from` and `states_operating_point`."""
         out = self._with_core(self.core)
-        out._states_pose = False
+        out._imported_from, out._states_pose = source, states_pose
         return out
 
     def with_controller_speed(self, factor: float) -> Robot:

@@ -73,15 +73,17 @@ def import_robot(
         if (file := drives_file(source, drives)) is not None:
             named += f", drives from {file.name}"
         drives = drive_data(source, drives)
+    # Drive data change what the file says.
+    unchanged = isinstance(source, str | Path) and drives == DriveData()
+    alone = Path(source) if unchanged else None
     tree, chain = bodies_and_chain(source, drives, base=base, tip=tip)
 
     def built(step_s: float | None) -> Robot:
         stated = drives if step_s is None else drives.model_copy(update={"sample_time": step_s})
         try:
             robot = Robot.from_toml(description(chain, stated, named))
-            if drives.operating_point is None:
-                robot = robot.without_stated_pose()
-            return robot.with_torque_constants(torque_constants(chain, stated))
+            robot = robot.with_torque_constants(torque_constants(chain, stated))
+            return robot.as_imported(alone, states_pose=drives.operating_point is not None)
         except RobotError as error:
             raise RobotError(f"{tree.file}: what was made of it is no robot: {error}") from None
 

@@ -26,6 +26,7 @@ from axisight.gap.simulator.start_poses import at_their_poses
 from axisight.gap.views.choice import view_of
 from axisight.gap.views.view import View
 from axisight.logs import Log
+from axisight.mujoco.rollout import runs_in_mujoco
 from axisight.robot import Robot
 
 
@@ -128,8 +129,11 @@ def behind_gate(
 ) -> PreparedLogs:
     """Return simulator and logs that passed the gate, with commands and references added if none were logged.
 
-    ``despite`` as in `Settings`, ``simulated`` and errors as in `diagnose`.
+    ``despite`` as in `Settings`, ``simulated`` and errors as in `diagnose`. Without ``simulated``, an MJCF is run in
+    MuJoCo, as far as `runs_in_mujoco` can.
     """
+    # Whatever an import leaves out of an MJCF is in its runs in MuJoCo.
+    simulated = simulated or runs_in_mujoco(robot, [*estimation, *validation])
     robot, slowed = with_bristles_followed(robot)
     read = in_torques(robot, estimation, validation)
     if read.nominal and simulated:

@@ -106,7 +106,7 @@ def test_logs_of_one_pose_are_left_alone(robot: Robot) -> None:
 def test_a_robot_without_a_stated_pose_starts_where_its_logs_do(robot: Robot) -> None:
     """The same logs are left alone where the pose is stated: then it is the encoder that may be off."""
     logs = logs_at(robot, np.repeat(POSES[1:2], 2, axis=0), [])
-    free = robot.without_stated_pose()
+    free = robot.as_imported(None, states_pose=False)
     assert not free.with_parameters({}).states_operating_point
     found = starts_of(free, at_their_poses(free, logs))
     assert found is not None
