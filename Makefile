@@ -3,7 +3,8 @@
 #
 #   make setup   environment with the package built and installed
 #   make demo    diagnose a sample case and write a report into demo/
-#   make test    Rust tests, stub check, Python tests against the installed wheel
+#   make test    Rust tests, stub check, Python tests against the installed wheel: about 20 minutes
+#   make test-long   the Python tests that `make test` leaves out: about 15 minutes
 #   make lint    formatting, clippy, ruff, spelling, mypy
 #   make format  rewrite the sources in the format that lint asks for
 #   make docs    regenerate the generated pages and build the site into site/
@@ -46,7 +47,7 @@ SOURCES := $(sort $(shell find crates python -type f \
 # The thesis's study is a package of its own, pure Python.
 STUDY := $(sort $(shell find thesis -type f -not -path '*/__pycache__/*' -not -name '.*'))
 
-.PHONY: setup demo test test-rust test-python lint format docs gallery notebooks wheel-smoke fuzz crash deny lock lowest bench clean force
+.PHONY: setup demo test test-rust test-python test-long lint format docs gallery notebooks wheel-smoke fuzz crash deny lock lowest bench clean force
 .DELETE_ON_ERROR:
 
 setup: $(STAMPS)/test-tools
@@ -67,7 +68,10 @@ test-rust:
 # would wait for one another: files run beside one another instead.
 test-python: $(STAMPS)/test-tools $(STAMPS)/docs-tools
 	$(BIN)/python -m mypy.stubtest axisight._core
-	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses $(JOBS) --dist loadfile
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses $(JOBS) --dist loadfile -m "not long" --durations=20
+
+test-long: $(STAMPS)/test-tools $(STAMPS)/docs-tools
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest --numprocesses $(JOBS) --dist loadfile -m long
 
 lint: $(STAMPS)/test-tools
 	$(CARGO) fmt --all --check

@@ -17,6 +17,20 @@ _HERE = Path(__file__).parent
 sys.path.extend(sorted({str(test.parent) for test in _HERE.rglob("test_*.py")} - {str(_HERE)}))
 
 
+def long_tests() -> list[str]:
+    """Return the tests that the gate leaves to `make test-long`, as `long_tests.txt` lists them."""
+    lines = (_HERE / "long_tests.txt").read_text("utf-8").splitlines()
+    return [line for line in lines if line and not line.startswith("#")]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark long tests: `-m "not long"` leaves them out."""
+    listed = set(long_tests())
+    for item in items:
+        if {item.nodeid, item.nodeid.partition("[")[0]} & listed:
+            item.add_marker(pytest.mark.long)
+
+
 def _data_folder() -> Path | None:
     named = os.environ.get("AXISIGHT_DATA")
     folder = Path(named) if named else _REPOSITORY.parent / "shared" / "data"
