@@ -113,12 +113,13 @@ def turning(
 
 
 def strongest_orders(
-    logs: Sequence[Turning], responses: Sequence[Complex], *, count: int, least_turns: float = 0.0
+    logs: Sequence[Turning], responses: Sequence[Complex], *, count: int, least_waves: float = 0.0
 ) -> list[int]:
     """Return up to ``count`` integer orders of the motor angle, the first found first.
 
     ``responses``: for each log, the transfer from an error that repeats with the motor angle to the residual, at the
-    frequencies `Turning.frequency_hz`. ``least_turns``: orders with fewer waves over the travel are left out.
+    frequencies `Turning.frequency_hz`. ``least_waves``: orders with fewer waves over the travel are left out, and those
+    that differ from one before by less than a wave: the travel does not resolve them.
 
     Method: least squares of the residuals of all logs on cosine and sine of ``n phi`` after the response, with one
     amplitude and phase for all logs. One order after another is added, each fitted with those before it (orthogonal
@@ -135,11 +136,14 @@ def strongest_orders(
         normal += log.normal(response)
         along += log.along(response, residual)
         power += float(residual @ residual)
-    travel = max(float(np.ptp(log.angle_rad)) for log in logs)
-    comes_round = np.arange(1, HIGHEST_ORDER + 1) * travel >= 2 * np.pi * least_turns
+    turns = max(float(np.ptp(log.angle_rad)) for log in logs) / (2 * np.pi)
+    orders = np.arange(1, HIGHEST_ORDER + 1)
+    resolved = orders * turns >= least_waves
     found: list[int] = []
     while len(found) < count:
-        gains = np.where(comes_round, _gains(normal, along, found), 0.0)
+        if least_waves and found:
+            resolved &= np.abs(orders - found[-1]) * turns >= 1.0
+        gains = np.where(resolved, _gains(normal, along, found), 0.0)
         best = int(np.argmax(gains))
         if not gains[best] > _WORTH * power:
             break

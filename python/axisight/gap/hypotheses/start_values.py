@@ -89,8 +89,8 @@ def _presliding(trial: StartContext) -> Hypothesis:
     )
 
 
-# Smallest number of waves over the travel of a prismatic axis.
-_SLIDE_TURNS = 2.0
+# Smallest number of waves over the travel of an axis; a longer wave could have any shape.
+_LEAST_WAVES = 2.0
 
 
 def _waves(trial: StartContext) -> Hypothesis | None:
@@ -111,9 +111,7 @@ def _waves(trial: StartContext) -> Hypothesis | None:
 def _orders(trial: StartContext, count: int) -> list[int]:
     """Return the strongest orders of the residual over the motor angle, given the response to the effect."""
     logs, responses = trial.turned()
-    # On a prismatic axis, a wave longer than the travel could have any shape.
-    least = _SLIDE_TURNS if trial.robot.axis_is_prismatic[trial.index] else 0.0
-    return strongest_orders(logs, responses, count=count, least_turns=least)
+    return strongest_orders(logs, responses, count=count, least_waves=_LEAST_WAVES)
 
 
 # Order of a harmonic drive: two waves per motor turn.

@@ -15,6 +15,7 @@ from axisight.gap.facts.faults import Finding
 from axisight.gap.facts.result import Reproduction
 from axisight.gap.facts.settings import Settings
 from axisight.gap.facts.simulator_variant import AS_GIVEN
+from axisight.gap.facts.wording import percent
 from axisight.gap.measure.where import ErrorLog, band_map, findings, regime_maps
 from axisight.gap.simulator.closed_loop_runs import simulated_positions
 from axisight.gap.views.view import View
@@ -38,7 +39,7 @@ def differs(found: Reproduction) -> NDArray[np.int64]:
 
 def said(found: Reproduction, compared: Compared = "torques") -> str:
     """Return a sentence about how well the model reproduces the user's simulator."""
-    axes = ", ".join(f"axis {i + 1}: {100 * x:.2g} %" for i, x in enumerate(found.per_axis))
+    axes = ", ".join(f"axis {i + 1}: {percent(x)}" for i, x in enumerate(found.per_axis.tolist()))
     whose = (
         "The gap is that of your simulator: the difference is subtracted from the logs"
         if found.taken_off
@@ -60,7 +61,7 @@ def _finding(found: Reproduction, axis: int) -> Finding:
     regime = "" if place.regime is None else f", {place.regime}"
     message = (
         f"expected a model that reproduces your simulator, got one that differs from it on axis "
-        f"{axis + 1} by {100 * found.of_gap[axis]:.3g} % of the gap{band}{regime}. Diagnose the simulated logs "
+        f"{axis + 1} by {percent(float(found.of_gap[axis]))} of the gap{band}{regime}. Diagnose the simulated logs "
         "themselves: the causes are what the model lacks"
     )
     return Finding("simulator_differs", "flag", message, None, axis + 1, "simulated")

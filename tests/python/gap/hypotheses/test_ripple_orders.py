@@ -36,6 +36,23 @@ def test_noise_alone_has_no_order():
     assert strongest_orders([log], [flat(log)], count=3) == []
 
 
+def test_orders_that_the_travel_does_not_resolve_are_left_out():
+    """Over a tenth of a turn, waves of order 1 may be a spring, and those of 40 and 45 differ by half a wave."""
+    time = np.arange(N) * T
+    angle = 0.1 * np.pi * np.sin(0.7 * time)
+
+    def swinging(residual):
+        return Turning(residual, angle, np.gradient(angle, T), T)
+
+    slow = swinging(np.cos(angle + 0.3))
+    assert strongest_orders([slow], [flat(slow)], count=1)[0] < 20
+    assert all(n >= 20 for n in strongest_orders([slow], [flat(slow)], count=3, least_waves=2.0))
+    both = swinging(np.cos(40 * angle) + 0.6 * np.sin(45 * angle))
+    (first, *others) = strongest_orders([both], [flat(both)], count=3, least_waves=2.0)
+    assert abs(first - 40) <= 5
+    assert all(abs(other - first) >= 10 for other in others)
+
+
 def test_logs_share_amplitude_and_phase():
     """What cancels over the logs is no ripple of the machine, however strong in each."""
     angle = turned(np.zeros(N)).angle_rad
