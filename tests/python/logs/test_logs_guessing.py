@@ -502,3 +502,29 @@ def test_columns_of_texts_are_named_with_their_first_text(tmp_path, rows, said):
         guess_columns(path)
     assert said in str(refused.value)
     assert str(refused.value).endswith("write one number into each cell")
+
+
+def with_stamps(columns: dict, time: np.ndarray) -> dict:
+    """Return columns of a motion, as they were recorded at other times."""
+    moved = {k: np.interp(time, columns["t"], x) for k, x in columns.items() if k != "t"}
+    return {"t": time, **moved}
+
+
+def test_velocities_fit_positions_though_most_stamps_come_early(tmp_path):
+    """Three steps of four are 7 % shorter than the mean: by the median the derivatives would be too large."""
+    columns = table("t", "pos_{}", "vel_{}", "tau_{}")
+    step = float(np.diff(columns["t"])[0])
+    steps = step * np.tile([0.93, 0.93, 0.93, 1.21], len(columns["t"]) // 4)
+    time = np.concatenate([[0.0], np.cumsum(steps)])
+    found = guessed(tmp_path, with_stamps(columns, time[time <= columns["t"][-1]]))
+    axis = found.columns.axis[0]
+    assert (axis.velocity.name, axis.velocity.unit) == ("vel_1", "rad/s")
+
+
+def test_a_map_has_the_line_that_bridges_a_hole(tmp_path):
+    columns = table("t", "pos_{}", "vel_{}", "tau_{}")
+    kept = np.delete(np.arange(len(columns["t"])), np.s_[400:440])
+    found = guessed(tmp_path, {k: np.asarray(x)[kept] for k, x in columns.items()})
+    rate = round(1.0 / float(np.median(np.diff(columns["t"]))))
+    assert f"# resample_hz = {rate}  # take off the # to bridge" in found.text
+    assert any("hole" in doubt for doubt in found.doubts)

@@ -23,7 +23,8 @@ class Draft:
     candidates among which the user must choose, or whose scale the user must state; ``scaled``: a scale is
     needed even if the unit is Nm. ``targets`` holds candidates for position targets, which the user may
     confirm. ``why`` gives the reason for a field, ``unused`` the reason for leaving out a name. ``doubts``
-    lists choices that may be wrong. ``by_numbers``: no name said which columns are positions.
+    lists choices that may be wrong. ``bridge_hz`` is the rate [Hz] that bridges holes of the stamps.
+    ``by_numbers``: no name said which columns are positions.
     """
 
     path: Path
@@ -37,6 +38,7 @@ class Draft:
     time: Series | None = None
     time_unit: str = "s"
     resample: bool = False
+    bridge_hz: float | None = None
     rate_name: str | None = None
     sample_time_s: float = 0.0
     fields: dict[str, list[tuple[Series, str]]] = field(default_factory=dict)

@@ -22,12 +22,12 @@ WORDS = {
     "error": "error err deviation",
     "acceleration": "acc accel acceleration accelerations ddq qdd qddot",
     "temperature": "temp temps temperature temperatures",
-    "torque": "tau torque torques effort efforts moment moments trq torq force forces",
+    "torque": "tau torque torques effort efforts eff moment moments trq torq force forces",
     "current": "current currents cur curr i iq amps",
     "voltage": "voltage voltages volt volts",
     "velocity": "dq qd qdot vel velocity velocities speed speeds omega dtheta qvel",
     "position": "q qm qpos pos position positions angle angles theta phi enc encoder",
-    "time": "time timestamp timestamps stamp t ts tm clock ipoc sec secs seconds ms msec us usec ns nsec",
+    "time": "time times timestamp timestamps stamp t ts tm clock ipoc sec secs seconds ms msec us usec ns nsec",
 }
 """Words for each quantity; if a name has words of several quantities, the first quantity wins."""
 _QUANTITIES = {word: quantity for quantity, words in WORDS.items() for word in words.split()}

@@ -41,6 +41,11 @@ def text_of(draft: Draft) -> str:
         lines += [f'unit = "{draft.time_unit}"']
         if draft.resample:
             lines += ['resample_hz = "mean"  # stamps are not uniform']
+        if draft.bridge_hz is not None:
+            rate = f"{draft.bridge_hz:.6g}"
+            lines += [
+                f"# resample_hz = {rate}  # take off the # to bridge the hole by a straight line"
+            ]
     lines += ["", *_comments("axes: ", [draft.why.get("axes", "one")])]
     lines += _comments("", [f"{name}: {draft.why[name]}" for name in _FIELDS if name in draft.why])
     check = "  # proposed, check: no name says so" if draft.by_numbers else ""
