@@ -19,7 +19,7 @@ from axisight.logs.map_files import AnyMap
 from axisight.logs.quality import check_signal
 from axisight.logs.reading import grid_of
 from axisight.logs.recorded import recorded_rows
-from axisight.logs.rows import check_rows
+from axisight.logs.rows import check_recorded, check_rows
 from axisight.logs.unit_guess import check_units
 from axisight.logs.validate import check_axes, check_finite, check_lengths
 
@@ -105,7 +105,7 @@ def check_log(
     if sound and rate is not None and grid.stamps_s is None:
         findings += check_rows(found.signals, found.labels, 1.0 / rate)
     elif sound and grid.stamps_s is not None:
-        findings += recorded_rows(grid.stamps_s, found.signals, found.labels).findings()
+        findings += check_recorded(recorded_rows(grid.stamps_s, found.signals, found.labels))
     if rate is not None and grid.stamps_s is None:
         findings += _look_at_units(found, 1.0 / rate)
     return LogReport(path, tuple(findings), rate, grid.n_samples, len(found.columns.axis))

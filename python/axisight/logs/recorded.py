@@ -10,11 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from axisight.logs.findings import Finding
-from axisight.logs.gather import Channel
-from axisight.logs.log import Floats
-from axisight.logs.rows import check_rows
+Floats = NDArray[np.float64]
+Channel = tuple[str, int]
 
 _MEASURED = ("position", "torque", "velocity")
 
@@ -32,13 +31,6 @@ class RecordedRows:
         kept = (self.stamps_s >= start_s) & (self.stamps_s < stop_s)
         signals = {channel: values[kept] for channel, values in self.signals.items()}
         return replace(self, stamps_s=self.stamps_s[kept] - start_s, signals=signals)
-
-    def findings(self) -> list[Finding]:
-        """Return findings about the rows; places count rows at the usual step between stamps."""
-        if len(self.stamps_s) < 2:
-            return []
-        usual_s = float(np.median(np.diff(self.stamps_s)))
-        return check_rows(self.signals, self.labels, usual_s)
 
 
 def recorded_rows(

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from axisight.logs.findings import Finding
 from axisight.logs.frozen import check_frozen, check_repeated_rows
 from axisight.logs.gather import Channel
 from axisight.logs.jumps import check_jumps
 from axisight.logs.log import Floats
+from axisight.logs.recorded import RecordedRows
 
 
 def check_rows(
@@ -24,3 +27,11 @@ def check_rows(
         *check_repeated_rows(signals, labels, sample_time_s),
         *check_jumps(signals, labels, sample_time_s),
     ]
+
+
+def check_recorded(rows: RecordedRows) -> list[Finding]:
+    """Return findings as `check_rows` about rows with uneven stamps; times count rows at the usual step."""
+    if len(rows.stamps_s) < 2:
+        return []
+    usual_s = float(np.median(np.diff(rows.stamps_s)))
+    return check_rows(rows.signals, rows.labels, usual_s)

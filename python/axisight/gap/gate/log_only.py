@@ -11,7 +11,7 @@ from axisight.logs import Log
 from axisight.logs.checking import look_at_signals
 from axisight.logs.grid import make_grid
 from axisight.logs.native import NATIVE_STEMS
-from axisight.logs.rows import check_rows
+from axisight.logs.rows import check_recorded, check_rows
 from axisight.logs.unit_guess import check_units
 from axisight.logs.validate import not_finite
 from axisight.records.clipping import clipped_samples
@@ -59,7 +59,7 @@ def check_log_alone(log: Log) -> list[Finding]:
     measured = {c: x for c, x in signals.items() if c[0] not in _REFERENCE}
     looked = look_at_signals(measured, labels, slides)
     if log.recorded is not None:
-        looked += log.recorded.findings()
+        looked += check_recorded(log.recorded)
     elif not log.is_resampled:  # interpolation causes steps and rests of its own
         looked += check_rows(measured, labels, log.sample_time_s)
     out = [named(f, log) for f in looked if f.severity != "ok" and f.name]

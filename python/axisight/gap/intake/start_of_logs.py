@@ -15,17 +15,14 @@ from axisight.fitting.simulation_error import is_closed_loop
 from axisight.gap.controller.speed_loop import with_integral
 from axisight.gap.facts.faults import Finding, flagged
 from axisight.gap.gate.log_only import check_log_alone
-from axisight.gap.prepare.log_start import begins, run_up_is_better, torque_is_from_rest
-from axisight.gap.prepare.run_up import NotRunUpError, begins_in_motion, run_up_to
+from axisight.gap.prepare.log_start import begins, run_up_is_better, torques_are_from_rest
+from axisight.gap.prepare.run_up import LEFT, NotRunUpError, begins_in_motion, run_up_to
 from axisight.gap.prepare.used_part import REST_S, stands
 from axisight.gap.signals.encoder_steps import encoder_steps
 from axisight.gap.signals.noise import position_noise_std
 from axisight.gap.views.closed_loop import TRACKING_SPEED
 from axisight.logs import Log
 from axisight.robot import Robot
-
-# Smallest share of a log that must be left.
-_LEFT = 0.5
 
 
 @dataclass(frozen=True)
@@ -83,15 +80,19 @@ def from_rest(
 
 
 def _moving(run_ups: _RunUps, logs: list[Log], *, simulates: bool) -> list[bool]:
-    """Return whether each log starts in motion; if its positions leave that open, simulations of its torque decide.
+    """Return whether each log starts in motion; where positions leave that open, torques decide.
 
-    If one log starts in motion, the open ones do too, since all were logged in one way. An open log counts as
-    at rest if no run-up to it is possible.
+    All logs were logged in one way: first torques that are from rest in all of them decide before positions do, since
+    a soft gear may move soon. Otherwise, if one log starts in motion, the open ones do too. An open log counts as at
+    rest if no run-up to it is possible.
     """
     robot = run_ups.robot
     noise = np.maximum(position_noise_std(logs), robot.position_noise_std)
     noise = np.maximum(noise, encoder_steps(robot, logs) / np.sqrt(12.0))
     how = [begins(log, noise) for log in logs]
+    doubtful = [log for log, one in zip(logs, how, strict=True) if one != "rest"]
+    if simulates and doubtful and run_ups.rest(doubtful):
+        return [False] * len(logs)
     left_open = [log for log, one in zip(logs, how, strict=True) if one == "open"]
     moving = "motion" in how
     if simulates and left_open:
@@ -131,15 +132,19 @@ class _RunUps:
         kept = with_integral(self.robot).with_controller_speed(TRACKING_SPEED)
         return run_up_to(self.robot, (self.robot, kept), log)
 
+    def rest(self, logs: Sequence[Log]) -> bool:
+        """Whether the first torques of all logs are from rest; False where they cannot be simulated."""
+        try:
+            return torques_are_from_rest(self.robot, logs)
+        except InputError:
+            return False
+
     def better_than_rest(self, log: Log) -> bool:
         """Whether a simulation with a run-up fits a log better than one from rest.
 
         False if no simulation along the log is possible; the gate reports its fault.
         """
-        try:
-            if torque_is_from_rest(self.robot, log):
-                return False
-        except InputError:
+        if self.rest([log]):
             return False
         run_up = self.to(log)
         return isinstance(run_up, Log) and run_up_is_better(self.robot, log, run_up)
@@ -181,7 +186,7 @@ def first_rest_s(log: Log) -> float | None:
     still = stands(log)
     still[: n // 2] = False
     places = np.flatnonzero(still)
-    if not len(places) or places[0] > (1 - _LEFT) * log.n_samples:
+    if not len(places) or places[0] > (1 - LEFT) * log.n_samples:
         return None
     start = float(places[0] * log.sample_time_s)
     try:

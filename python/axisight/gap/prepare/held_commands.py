@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.gate.by_dynamics.inverse_checks import thinned
-from axisight.gap.gate.by_dynamics.torque_fit import nuisance
+from axisight.gap.gate.by_dynamics.torque_fit import ALIKE, PARTS, SIGNIFICANT, nuisance
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from axisight.gap.signals.motion import Motion
 from axisight.logs import Log
@@ -25,13 +25,6 @@ Array = NDArray[np.float64]
 # Largest time [samples] by which a command acts later than it is logged, with the error of an estimate. A torque
 # that is logged late is not corrected: an elastic gear looks alike on all axes.
 _MOST_SAMPLES = 1.1
-# Smallest significance of the shift [standard errors], and of an axis that has to agree with the others.
-_SIGNIFICANT, _TELLS = 10.0, 3.0
-# Largest difference between the shift of an axis and the common one, relative to that one or, with _TELLS, to its
-# error. An effect that the simulator lacks on some axes seems to shift these axes alone.
-_ALIKE = 0.35
-# Number of parts of each log whose scatter gives the standard error.
-_PARTS = 10
 
 
 @dataclass(frozen=True)
@@ -66,11 +59,13 @@ def held_commands(robot: Robot, logs: Sequence[Log]) -> HeldCommands | None:
     if not weight.any():
         return None
     later_s = float(weight @ own_s / weight.sum())
-    least_s = _SIGNIFICANT / float(np.sqrt(weight.sum()))
+    least_s = SIGNIFICANT / float(np.sqrt(weight.sum()))
     if not least_s <= later_s <= _MOST_SAMPLES * logs[0].sample_time_s:
         return None
-    tell = (error_s > 0.0) & (later_s >= _TELLS * error_s)
-    alike = np.abs(own_s - later_s) <= np.maximum(_ALIKE * later_s, _TELLS * error_s)
+    # An axis that tells needs half of the significance of all. An effect that the simulator lacks on some axes seems
+    # to shift these axes alone.
+    tell = (error_s > 0.0) & (later_s >= 0.5 * SIGNIFICANT * error_s)
+    alike = (own_s > ALIKE[0] * later_s) & (own_s < ALIKE[1] * later_s)
     agreed = tell.sum() > 1 and alike[tell].all()
     return HeldCommands(later_s, logs[0].sample_time_s) if agreed else None
 
@@ -103,7 +98,7 @@ def _cells(robot: Robot, log: Log) -> list[Array]:
     base = predict(robot, at)
     pairs = [_rate_and_left(at, base, axis, sample_time_s) for axis in range(robot.n_axes)]
     rates, lefts = (np.column_stack(x) for x in zip(*pairs, strict=True))
-    parts = zip(np.array_split(rates, _PARTS), np.array_split(lefts, _PARTS), strict=True)
+    parts = zip(np.array_split(rates, PARTS), np.array_split(lefts, PARTS), strict=True)
     return [np.column_stack([(c * x).sum(axis=0), (c * c).sum(axis=0)]) for c, x in parts]
 
 

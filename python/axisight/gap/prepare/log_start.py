@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.prepare.used_part import STANDS
+from axisight.gap.prepare.used_part import NOISES, STANDS
 from axisight.gap.signals.noise import white_std
-from axisight.gap.simulator.start_poses import start_of
+from axisight.gap.simulator.start_poses import OFFSET_RAD, start_of
 from axisight.logs import Log
 from axisight.robot import Robot
 from axisight.simulation import simulate
@@ -21,9 +22,7 @@ Begins = Literal["rest", "motion", "open"]
 _FEWEST = 4
 # Duration of the longest parabola [s]: loops respond to a step of their reference within milliseconds.
 _LONGEST_S = 0.01
-# Standard deviations of noise that a term of a parabola must exceed.
-_NOISES = 6.0
-# Standard deviations of noise that positions may be off a parabola.
+# Standard deviations of noise that positions may be off a parabola, and first torques off those of a rest.
 _OFF = 3.0
 # Smallest acceleration that counts, as a share of the largest in the log.
 _STEADY = 0.03
@@ -34,6 +33,8 @@ _COMPARED = 0.5
 _FADED = 0.8
 # Share of that difference that a log must show to start in motion.
 _HALF = 0.5
+# Fewest logs that can tell by a common constant, or by their first samples.
+_SEVERAL = 3
 # Smallest noise of a torque, as a share of the arm's largest torque scatter.
 _NOISELESS = 1e-3
 
@@ -66,9 +67,9 @@ def _start_of_axes(log: Log, n: int, noise_std: float | Array) -> list[Begins]:
     speed, acceleration = np.abs(terms[1]), 2 * np.abs(terms[2])
     of_speed, of_half = np.linalg.norm(solved[1:], axis=1)
     top = np.abs(np.diff(log.position_rad, axis=0)).max(axis=0) / step
-    moves = speed > STANDS * top + _NOISES * of_speed * noise_std
+    moves = speed > STANDS * top + NOISES * of_speed * noise_std
     most = _STEADY * _largest_acceleration(log, n)
-    turns = acceleration > most + 2 * _NOISES * of_half * noise_std
+    turns = acceleration > most + 2 * NOISES * of_half * noise_std
     # A start from rest has a parabola without speed. If positions are off the parabola, the motion began within
     # it.
     told = np.abs(first - powers @ terms).max(axis=0) < _OFF * noise_std + STANDS * top * step
@@ -85,19 +86,53 @@ def _largest_acceleration(log: Log, n: int) -> Array:
     return np.asarray(np.abs(second).max(axis=0) / (half * log.sample_time_s) ** 2)
 
 
-def torque_is_from_rest(robot: Robot, log: Log) -> bool:
-    """Whether a log's first torque is that of a simulation from rest, within noise.
+def torques_are_from_rest(robot: Robot, logs: Sequence[Log]) -> bool:
+    """Whether the first torques of all logs are those of simulations from rest.
 
-    At rest, missing effects do not change the torque unless they are constant. If the constant torque is off
-    too, the answer is False.
+    | they differ from those | why that is a rest |
+    |---|---|
+    | by noise, over the first response of the loop | nothing moved before |
+    | by one constant in all logs, over that response | a load or a gear is wrong; different motions would differ |
+    | by noise in the first sample of every log | no motion yet, whatever the machine lacks |
+
+    The last two hold for three logs and more, of one pose, with different first references.
     """
-    resting = _torques_from_rest(robot, log, _response_samples(log))
-    if resting is None:
+    missed = [_first_missed(robot, log) for log in logs]
+    if not all(np.isfinite(x).all() for x in missed):
         return False
-    missed = ((log.torque_nm[: _response_samples(log)] - resting) / _noise_nm(log))[
-        :, _moving_axes(log)
-    ]
-    return bool(np.all(np.abs(missed.mean(axis=0)) < _NOISES / np.sqrt(len(missed))))
+    if all(_is_noise(x) for x in missed):
+        return True
+    if len(logs) < _SEVERAL or not _differ(robot, logs):
+        return False
+    usual = np.median([x.mean(axis=0) for x in missed], axis=0)
+    alike = all(_is_noise(x - usual) for x in missed)
+    return alike or all(bool(np.all(np.abs(x[0]) < _OFF)) for x in missed)
+
+
+def _is_noise(missed: Array) -> bool:
+    """Whether the means of errors over noise (n, n_axes) are noise on every axis."""
+    return bool(np.all(np.abs(missed.mean(axis=0)) < NOISES / np.sqrt(len(missed))))
+
+
+def _first_missed(robot: Robot, log: Log) -> Array:
+    """Return the first torques minus those of a simulation from rest, over noise (n, n_axes); NaN if it is unstable.
+
+    Zero on axes that do not move.
+    """
+    n = min(_response_samples(log), log.n_samples)
+    resting = _torques_from_rest(robot, log, n)
+    if resting is None:
+        return np.full((n, log.n_axes), np.nan)
+    return np.where(_moving_axes(log), (log.torque_nm[:n] - resting) / _noise_nm(log), 0.0)
+
+
+def _differ(robot: Robot, logs: Sequence[Log]) -> bool:
+    """Whether logs begin at one pose with different references."""
+    poses = np.array([log.position_rad[0] for log in logs]) * robot.gear_ratio
+    led = [log.velocity_ref_rad_s for log in logs if log.velocity_ref_rad_s is not None]
+    first, top = np.array([x[0] for x in led]), max(float(np.abs(x).max()) for x in led)
+    one_pose = bool(np.all(np.ptp(poses, axis=0) < OFFSET_RAD))
+    return one_pose and bool(np.any(np.ptp(first, axis=0) > STANDS * top))
 
 
 def run_up_is_better(robot: Robot, log: Log, run_up: Log) -> bool:
@@ -166,4 +201,4 @@ def _shows_half(missed: Array, apart: Array, least: int) -> bool:
     n = max(least, int(np.searchsorted(square, _FADED * square[-1])) + 1)
     varies = apart[:n] - apart[:n].mean(axis=0)
     size = float(np.sum(varies**2))
-    return size > _NOISES**2 and float(np.sum(varies * missed[:n])) > _HALF * size
+    return size > NOISES**2 and float(np.sum(varies * missed[:n])) > _HALF * size

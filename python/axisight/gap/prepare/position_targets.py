@@ -17,6 +17,7 @@ from axisight.errors import InputError
 from axisight.gap.controller.feedback import feedback, rotors, told_as_torque
 from axisight.gap.facts.faults import Finding
 from axisight.gap.prepare.run_up import NotRunUpError, begins_in_motion, run_up_to
+from axisight.gap.prepare.used_part import NOISES
 from axisight.gap.signals.noise import position_noise_std
 from axisight.gap.simulator.start_poses import at_their_poses
 from axisight.logs import Log
@@ -29,8 +30,6 @@ Array = NDArray[np.float64]
 _CLOCK = 0.01
 # Largest speed of a start at rest, as a share of the top speed.
 _AT_REST = 0.02
-# Standard deviations of the speed's noise that are added to it.
-_NOISES = 6.0
 
 
 @dataclass(frozen=True)
@@ -244,7 +243,7 @@ def _moving(log: Log) -> NDArray[np.bool_]:
     """Return whether an axis moves at the start of a log (n_axes,)."""
     speed = np.gradient(log.position_rad, log.sample_time_s, axis=0)
     noise = position_noise_std([log]) / log.sample_time_s
-    allowed = _AT_REST * np.abs(speed).max(axis=0) + _NOISES * noise
+    allowed = _AT_REST * np.abs(speed).max(axis=0) + NOISES * noise
     return np.asarray(np.abs(speed[0]) > allowed)
 
 

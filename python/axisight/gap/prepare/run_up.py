@@ -34,8 +34,8 @@ _SEEN_S = 0.02
 _SEEN_SAMPLES = 8
 # Fewest logged samples from which the first motion is estimated, for logs sampled slower than the controller.
 _SEEN_STEPS = 4
-# Smallest share of a log that must be left.
-_LEFT = 0.5
+LEFT = 0.5
+"""Smallest share of a log that must be left."""
 # Iterations for the start angle, which depends on the holding torque there. Each step leaves 0.1 % of the
 # error.
 _STEPS = 2
@@ -88,7 +88,7 @@ def _burn_in_s(log: Log, decay_1_s: float, step: int) -> float:
     if not decay_1_s > 0:
         raise NotRunUpError(f"{log.name}: the loop does not settle where the log begins")
     seconds = -np.log(FORGOTTEN) / decay_1_s
-    if seconds > (1 - _LEFT) * log.duration_s or log.duration_s - seconds < 1.0:
+    if seconds > (1 - LEFT) * log.duration_s or log.duration_s - seconds < 1.0:
         raise NotRunUpError(
             f"{log.name}: the loop takes {seconds:.3g} s to forget how it began, more than half of "
             f"{log.duration_s:.3g} s"

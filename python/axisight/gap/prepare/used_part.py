@@ -21,7 +21,7 @@ REST_S = 0.2
 # Mean speed below which a motor stands, as a share of the largest.
 STANDS = 0.005
 # Standard deviations of the mean speed's noise that are added to it.
-_NOISES = 6.0
+NOISES = 6.0
 # Rest that is kept before and after a motion [s].
 _KEPT_S = 0.2
 # Rest that separates two motions [s].
@@ -115,7 +115,7 @@ def stands(log: Log) -> NDArray[np.bool_]:
     n = max(4, round(REST_S / log.sample_time_s))
     speed = _speeds(log, n)
     noise = position_noise_std([log]) / (log.sample_time_s * n)
-    still = np.all(speed <= STANDS * speed.max(axis=0) + _NOISES * noise, axis=1)
+    still = np.all(speed <= STANDS * speed.max(axis=0) + NOISES * noise, axis=1)
     if log.velocity_ref_rad_s is not None:
         told = np.abs(log.velocity_ref_rad_s)
         told = scipy.ndimage.maximum_filter1d(told, n, axis=0, mode="nearest")

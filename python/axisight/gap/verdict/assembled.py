@@ -10,7 +10,14 @@ import numpy as np
 import xarray as xr
 
 from axisight.gap.facts.faults import Finding
-from axisight.gap.facts.result import Cause, Diagnosis, Interval, MotionErrors, Where
+from axisight.gap.facts.result import (
+    Cause,
+    DetectionLimit,
+    Diagnosis,
+    Interval,
+    MotionErrors,
+    Where,
+)
 from axisight.gap.facts.settings import Settings
 from axisight.gap.facts.simulator_variant import Variant
 from axisight.gap.fit.fitted_model import FittedModel
@@ -120,7 +127,7 @@ def assembled(
         p_none=conclusion.p_none,
         p_unknown=conclusion.p_unknown,
         remainder=left,
-        detection_limits=detection_limits(found, view),
+        detection_limits=_limits(detection_limits(found, view), conclusion),
         findings=(
             *noted,
             *refit_worse(reach.stages, names),
@@ -136,6 +143,12 @@ def assembled(
         ),
         provenance=_provenance(robot, view, names, settings),
     )
+
+
+def _limits(limits: Sequence[DetectionLimit], conclusion: Conclusion) -> tuple[DetectionLimit, ...]:
+    """Return the limits on axes without an unknown gap: what is unknown may hide any effect."""
+    unknown = {a.axis for a in conclusion.axes if a.verdict == "unknown"}
+    return tuple(x for x in limits if not (unknown if x.axis is None else x.axis in unknown))
 
 
 def _concluded(
@@ -157,6 +170,7 @@ def _concluded(
         share,
         removed,
         steps > 0,
+        differentiated=view.mode == "inverse_dynamics",
     )
     measured = [view.measured(log) for log in held_logs]
     conclusion, of_steps = with_coarse_encoders(

@@ -46,6 +46,8 @@ def carried_over(
     bent: float = 0.0,
     removed: float | None = None,
     stepped: NDArray[np.bool_] | None = None,
+    *,
+    differentiated: bool = False,
 ) -> Conclusion:
     """Return the conclusion, or *unknown* with the reason where the validation logs contradict it.
 
@@ -55,18 +57,20 @@ def carried_over(
     | causes of the size of noise | they do not shrink it, and no log stands above the floor | *none* |
     | *none* | a log stands above the floor | *unknown* |
     | anything | the estimated noise is larger than a gap that is seen | *unknown* |
-    | anything | noise alone is so large a share of the torque that no gap would be clear | *unknown* |
+    | anything | noise of differentiated positions hides any gap | *unknown* |
 
     - ``own``: causes that are judged on their own axes alone; they must shrink the gap there.
     - ``bent``: share of the own parameters at the edge of their tolerance in the fit with the causes.
     - ``removed``: share of the validation residual above noise that the causes remove; None if unknown.
+    - ``differentiated``: whether torques are predicted from differentiated positions. Their noise lies in the band
+      that is compared, so that no average over the log removes it.
     - ``stepped`` (n_axes,): axes whose noise comes from encoder steps; none by default.
     """
     withdrawn = None
     labels = tuple(cause.label for cause in conclusion.causes)
     if gap.refitted > _SEEN and gap.floor > _ABSURD * gap.refitted:
         withdrawn = Withdrawal("noise", gap.before, gap.refitted, gap.floor)
-    elif hides_all(gap.floor):
+    elif differentiated and hides_all(gap.floor):
         withdrawn = Withdrawal("loud", gap.before, gap.refitted, gap.floor)
     elif own is not None:
         # Another motion may show more of what no effect explains, and as much of the causes.

@@ -14,7 +14,7 @@ from test_run_up import QUICK, SECONDS, WITHHELD, rigid_axis, run_up, waves
 from axisight import Effect, Log, Robot, diagnose
 from axisight.gap.intake import start_of_logs
 from axisight.gap.intake.start_of_logs import from_rest
-from axisight.gap.prepare.log_start import begins, run_up_is_better, torque_is_from_rest
+from axisight.gap.prepare.log_start import begins, run_up_is_better, torques_are_from_rest
 from axisight.logs import RunUp
 from gap_data import bare_axis, log_of, scattered
 
@@ -97,7 +97,7 @@ def beside_standing(log: Log, held_nm: float) -> Log:
 
 def runs_on(robot: Robot, log: Log) -> bool:
     """Whether a log is told to begin in motion, by a simulation from rest and one that is run up to it."""
-    told = torque_is_from_rest(robot, log)
+    told = torques_are_from_rest(robot, [log])
     return not told and run_up_is_better(robot, log, run_up(robot, log))
 
 
@@ -143,14 +143,54 @@ def test_no_run_up_is_made_where_the_first_torque_is_that_of_a_rest(
 ) -> None:
     robot = bare_axis()
     log = at_once(robot, kind, "none")
-    assert torque_is_from_rest(robot, log)
-    assert not any(torque_is_from_rest(robot, turning) for turning in turning_logs(robot, "none"))
+    assert torques_are_from_rest(robot, [log])
+    assert not any(torques_are_from_rest(robot, [x]) for x in turning_logs(robot, "none"))
 
     def refused(*_args: object) -> Log:
         raise AssertionError("a run-up was made")
 
     monkeypatch.setattr(start_of_logs, "run_up_to", refused)
     assert from_rest(robot, [log], [log], []).estimation == [log]
+
+
+def started(robot: Robot, withheld: str = "none", machine: Robot | None = None) -> list[Log]:
+    """Four logs from rest at one pose, with references that begin with different steps."""
+    time = STEP_S * np.arange(round(3.0 / STEP_S))
+    return [
+        log_of(
+            scattered(robot, 3) if machine is None else machine,
+            WITHHELD[withheld],
+            (scale * np.cos(2 * np.pi * 3.0 * time))[:, None],
+            run,
+        )
+        for run, scale in enumerate((6.0, -4.0, 2.0, 9.0))
+    ]
+
+
+def test_a_load_that_is_missing_is_no_motion() -> None:
+    """Logs of one pose are off by one torque; with one that turns round among them they are no rest."""
+    robot = bare_axis()
+    logs = [replace(log, torque_nm=log.torque_nm + 3.0) for log in started(robot)]
+    assert torques_are_from_rest(robot, logs)
+    turning = replace(logs[0], torque_nm=logs[0].torque_nm + 4.0)
+    assert not torques_are_from_rest(robot, [*logs, turning])
+    # One motion recorded several times tells nothing: it could turn round each time.
+    assert not torques_are_from_rest(robot, [logs[0]] * 4)
+
+
+def test_a_loop_that_responds_late_is_no_motion() -> None:
+    """A delay changes the first ten milliseconds of every log by another torque, but not the first samples."""
+    robot = bare_axis()
+    logs = started(robot, "input_delay")
+    assert not all(torques_are_from_rest(robot, [log]) for log in logs)
+    assert torques_are_from_rest(robot, logs)
+    found = from_rest(robot, logs[:3], logs[3:], [])
+    assert found.estimation == logs[:3] and not found.findings
+
+
+def test_logs_that_turn_round_are_told_together() -> None:
+    robot = bare_axis()
+    assert not torques_are_from_rest(robot, turning_logs(robot, "none"))
 
 
 @pytest.mark.parametrize("column", ["velocity_ref_rad_s", "torque_nm"])

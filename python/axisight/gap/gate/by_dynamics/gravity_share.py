@@ -8,23 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.facts.faults import Finding, GateSeverity
-from axisight.gap.gate.by_dynamics.torque_fit import nuisance
+from axisight.gap.gate.by_dynamics.torque_fit import EXPLAINED, SAME, nuisance
 from axisight.gap.gate.by_dynamics.undone_mistakes import GRAVITY, predict
 from axisight.gap.signals.motion import Motion
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Smallest scatter of the weight on an axis, as a share of the torque's, that the torque must show. Friction and
-# an offset are taken off both. The weight must also scatter more than what the regression leaves.
-_TELLS = 0.05
 # Largest factor of the weight that counts as none. Masses are known to a few per cent; a counterbalance that
 # carries more than this share of an axis' weight on every axis would be found as well.
 _NONE = 0.15
-# Range of the factor of the rest: beyond it, positions are in another unit, and the weight is not that of the arm.
-_SAME = (0.4, 2.5)
-# Largest share of the torque's variance that may be left without gravity.
-_LEFT = 0.3
 
 
 def check_gravity_share(robot: Robot, motions: Sequence[Motion]) -> list[Finding]:
@@ -38,7 +31,7 @@ def check_gravity_share(robot: Robot, motions: Sequence[Motion]) -> list[Finding
     factors = [both for axis in range(robot.n_axes) if (both := _factors(parts, axis)) is not None]
     if not factors or (len(factors) == 1 < robot.n_axes):
         return []
-    if not all(abs(weight) < _NONE and _SAME[0] < rest < _SAME[1] for weight, rest in factors):
+    if not all(abs(weight) < _NONE and SAME[0] < rest < SAME[1] for weight, rest in factors):
         return []
     severity: GateSeverity = "refuse" if robot.n_axes > 1 else "flag"
     words, _ = GRAVITY["torque_without_gravity"]
@@ -72,5 +65,6 @@ def _factors(parts: Sequence[_Parts], axis: int) -> tuple[float, float] | None:
     columns = np.column_stack([weight, rest])
     factors = np.linalg.lstsq(columns, torque, rcond=None)[0]
     left = float(np.sum((torque - columns @ factors) ** 2))
-    tells = float(weight @ weight) > max(_TELLS**2 * power, left) > 0.0
-    return (float(factors[0]), float(factors[1])) if tells and left < _LEFT * power else None
+    # A weight that scatters less than what is left does not show.
+    tells = float(weight @ weight) > left > 0.0
+    return (float(factors[0]), float(factors[1])) if tells and left < EXPLAINED * power else None

@@ -11,7 +11,7 @@ from axisight.gap.facts.faults import Finding, GateSeverity, refused
 from axisight.gap.gate.by_dynamics.friction_sign import check_passive
 from axisight.gap.gate.by_dynamics.gravity_share import check_gravity_share
 from axisight.gap.gate.by_dynamics.small_errors import check_small_errors
-from axisight.gap.gate.by_dynamics.torque_fit import TorqueFit, torque_fit
+from axisight.gap.gate.by_dynamics.torque_fit import EXPLAINED, SAME, TorqueFit, torque_fit
 from axisight.gap.gate.by_dynamics.undone_mistakes import (
     GRAVITY,
     Mistake,
@@ -31,21 +31,13 @@ Array = NDArray[np.float64]
 _BAND_HZ = 10.0
 # Samples that are kept in a period of the cutoff.
 _SAMPLES_PER_BAND = 10
-# Unexplained share of an axis' torque variance from which mistakes are looked for. With friction and offset in
-# the regression, simulators of real machines leave 10 % or less.
-_SUSPICIOUS = 0.3
 # Share of the unexplained variance, summed over the axes, that a named mistake must remove when it is undone.
 _REMOVED = 0.5
 # Smallest such decrease of the sum, as a share of one axis' variance.
 _LEAST_REMOVED = 0.08
-# Largest unexplained share on the axes concerned once a named mistake is undone.
-_EXPLAINED = 0.3
 # Share of the torque's variance that the prediction must explain beyond friction for its factor to be known.
 _CARRIES = 0.1
-# Range of the factor of the torque that is no finding. A load or gravity that is compensated in the arm changes
-# torques by up to two.
-_SAME = (0.4, 2.5)
-# Range of the factor that is no refusal if all axes lie outside `_SAME`. A heavy tool changes the torque of a
+# Range of the factor that is no refusal if all axes lie outside `SAME`. A heavy tool changes the torque of a
 # wrist by five and more, but not that of all axes.
 _ALL_AXES = (0.25, 4.0)
 # Range of the factor that is no refusal of a unit on one axis: no load changes torques by thirty.
@@ -84,7 +76,7 @@ def _one_log(robot: Robot, log: Log, at: Motion) -> list[Finding]:
         return fast
     given = torque_fit(at[3], predict(robot, at), at)
     turned = (given.slope < 0.0) & (given.gain > _CARRIES)
-    if np.any((given.left > _SUSPICIOUS) | turned):
+    if np.any((given.left > EXPLAINED) | turned):
         found = _most_likely(robot, at, given)
         if found is not None:
             return [_named(log, found, given)]
@@ -113,7 +105,7 @@ def _most_likely(robot: Robot, at: Motion, given: TorqueFit) -> Mistake | None:
         return None
     removed = given.total - best.fit.total
     axes = list(best.axes)
-    explains = float(best.fit.left[axes].max()) < _EXPLAINED
+    explains = float(best.fit.left[axes].max()) < EXPLAINED
     enough = removed > max(_REMOVED * given.total, _LEAST_REMOVED)
     return best if enough and explains else None
 
@@ -152,12 +144,12 @@ def _named(log: Log, found: Mistake, given: TorqueFit) -> Finding:
 def _scales(robot: Robot, log: Log, given: TorqueFit) -> list[Finding]:
     """Return findings about torques that are a multiple of the predicted ones."""
     out = []
-    known = (given.gain > _CARRIES) & (given.left < _SUSPICIOUS) & (given.slope > 0.0)
+    known = (given.gain > _CARRIES) & (given.left < EXPLAINED) & (given.slope > 0.0)
     slopes = given.slope[known]
     everywhere = bool(np.all((slopes < _ALL_AXES[0]) | (slopes > _ALL_AXES[1])))
     for axis in np.flatnonzero(known).tolist():
         slope = float(given.slope[axis])
-        if _SAME[0] < slope < _SAME[1]:
+        if SAME[0] < slope < SAME[1]:
             continue
         name = scale_name("torque", slope, float(robot.gear_ratio[axis]))
         a_unit = not (_ONE_AXIS[0] < slope < _ONE_AXIS[1] or name.endswith("_scaled"))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.facts.faults import Finding, GateSeverity
-from axisight.gap.gate.by_dynamics.torque_fit import nuisance
+from axisight.gap.gate.by_dynamics.torque_fit import ALIKE, PARTS, SIGNIFICANT, nuisance
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from axisight.gap.signals.motion import Motion
 from axisight.robot import Robot
@@ -36,14 +36,8 @@ _MOST_RAD = 0.6
 # Smallest share of the remaining error that one error must explain. Payloads and other laws of friction explain
 # less, or not evenly.
 _REMOVED = 0.05
-# Smallest significance of an error [standard errors].
-_SIGNIFICANT = 6.0
-# Number of parts of each log whose scatter gives the standard error.
-_PARTS = 10
 # Logs whose effect has less than this share of the largest energy are not compared.
 _TELLS = 0.1
-# Range of the ratio of a log's estimate to that of all logs.
-_ALIKE = (0.5, 2.0)
 
 
 def check_small_errors(robot: Robot, motions: Sequence[tuple[float, Motion]]) -> list[Finding]:
@@ -64,7 +58,7 @@ def check_small_errors(robot: Robot, motions: Sequence[tuple[float, Motion]]) ->
     for _ in range(len(names)):
         columns = [[part[i] for _, part in parts] for i in range(len(names))]
         best = _strongest(targets, columns, limits)
-        if best is None or best.share < _REMOVED or best.significance < _SIGNIFICANT:
+        if best is None or best.share < _REMOVED or best.significance < SIGNIFICANT:
             break
         finding = _finding(names[best.index], best.size, best.share)
         if finding is None:
@@ -176,14 +170,14 @@ def _strongest(
 
 
 def _cut(x: Array) -> list[Array]:
-    return np.array_split(x, _PARTS)
+    return np.array_split(x, PARTS)
 
 
 def _alike(per_log: Array, size: float) -> bool:
     """Whether all logs with a large enough effect give about the same size; rows: product and energy of a log."""
     tells = per_log[:, 1] > _TELLS * per_log[:, 1].max()
     ratio = per_log[tells, 0] / per_log[tells, 1] / (size or 1.0)
-    return bool(np.all((ratio > _ALIKE[0]) & (ratio < _ALIKE[1])))
+    return bool(np.all((ratio > ALIKE[0]) & (ratio < ALIKE[1])))
 
 
 def _finding(name: tuple[str, int], size: float, share: float) -> Finding | None:

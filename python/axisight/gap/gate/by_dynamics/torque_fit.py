@@ -11,6 +11,20 @@ from axisight.gap.signals.motion import Motion
 
 Array = NDArray[np.float64]
 
+EXPLAINED = 0.3
+"""Largest share of an axis' torque variance that a right simulator leaves.
+
+With friction and offset in the regression, simulators of real machines leave 10 % or less."""
+SAME = (0.4, 2.5)
+"""Range of the factor of a predicted torque that is no finding.
+
+A load or gravity that is compensated in the arm changes torques by up to two."""
+PARTS = 10
+"""Number of parts of each log whose scatter gives a standard error."""
+ALIKE = (0.5, 2.0)
+"""Range of the ratio of one log's or axis' estimate to that of all."""
+SIGNIFICANT = 6.0
+"""Smallest significance of an error of a log [standard errors]."""
 # Speed where the smoothed sign turns, as a share of the largest speed.
 _CORNER = 0.02
 

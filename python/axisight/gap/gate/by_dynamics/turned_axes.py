@@ -12,14 +12,12 @@ import numpy as np
 
 from axisight.gap.facts.faults import Finding
 from axisight.gap.gate.by_dynamics.inverse_checks import thinned
-from axisight.gap.gate.by_dynamics.torque_fit import TorqueFit, torque_fit
+from axisight.gap.gate.by_dynamics.torque_fit import EXPLAINED, TorqueFit, torque_fit
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict, undone
 from axisight.gap.signals.motion import Motion
 from axisight.logs import Log
 from axisight.robot import Robot
 
-# Largest unexplained share of an axis' variance that a log may have with a turned axis.
-_EXPLAINED = 0.3
 # Largest unexplained share with the turned axis, relative to that without, summed over the axes. An effect that
 # the simulator lacks does not vanish with a turned axis.
 _LEFT = 0.25
@@ -66,7 +64,7 @@ def _turned(robot: Robot, at: Motion, axis: int) -> TorqueFit:
 
 def _explains(given: TorqueFit, turned: TorqueFit) -> bool:
     enough = given.total - turned.total > _LEAST_REMOVED and turned.total < _LEFT * given.total
-    return enough and float(turned.left.max()) < _EXPLAINED
+    return enough and float(turned.left.max()) < EXPLAINED
 
 
 def _named(axis: int, log: Log, given: TorqueFit, turned: TorqueFit) -> Finding:
