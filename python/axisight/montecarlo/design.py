@@ -19,6 +19,7 @@ from axisight.effects import Effect, core_effects
 from axisight.errors import InputError, StudyError
 from axisight.montecarlo.study import Study
 from axisight.robot import Robot, load_robot
+from axisight.robot.axis_names import axis_number, effect_on
 from axisight.simulation import Integrator
 
 Arrays = dict[str, NDArray[Any]]
@@ -96,7 +97,7 @@ def core_study(design: str) -> _core.MonteCarloStudy:
             resolution=measurement["position_resolution_rad"],
             output=measurement["output"],
             spread=[
-                (s["parameter"], s["distribution"], s["relative"], s["absolute"])
+                (_numbered(s["parameter"], robot), s["distribution"], s["relative"], s["absolute"])
                 for s in d["spread"]
             ],
             relative_accuracy=d["statistics"]["relative_accuracy"],
@@ -114,11 +115,28 @@ def core_study(design: str) -> _core.MonteCarloStudy:
 
 def _effects(design: Mapping[str, Any], robot: Robot) -> list[Effect]:
     """Return the effects of a study, and the robot's own effects that it spreads."""
-    given = [Effect(**entry) for entry in design["effect"]]
+    given = [effect_on(Effect(**entry), robot.axis_names) for entry in design["effect"]]
     labels = {effect.label for effect in given}
-    spread = {entry["parameter"].rpartition(".")[0] for entry in design["spread"]}
+    spread = {_numbered(entry["parameter"], robot).rpartition(".")[0] for entry in design["spread"]}
     own = [e for e in robot.effects if e.label in spread - labels]
     return [*own, *given]
+
+
+def _numbered(parameter: str, robot: Robot) -> str:
+    """Return the name of a spread parameter with axis numbers in place of joint names.
+
+    Raises InputError, with the nearest name, for a joint that the robot does not have.
+    """
+    label, _, name = parameter.rpartition(".")
+    effect, at, axes = label.partition("@")
+    if not at:
+        return parameter
+    field = f"spread {parameter!r}: axis"
+    numbers = [
+        axis if axis.isdigit() else str(axis_number(axis, robot.axis_names, field))
+        for axis in axes.split(",")
+    ]
+    return f"{effect}@{','.join(numbers)}.{name}"
 
 
 def compute_block(

@@ -231,6 +231,19 @@ def test_spread_of_an_effect():
         mc.run(small_study(spread=[mc.Spread(parameter="axis9.stiffness", relative=0.1)]))
 
 
+def test_spread_of_an_effect_names_its_joint(tmp_path):
+    path = robot_file(tmp_path, 'name = "axis1"', 'name = "shoulder"')
+
+    def varied(parameter: str):
+        spread = [mc.Spread(parameter=parameter, absolute=0.5)]
+        return mc.run(small_study(robot=path, spread=spread)).arithmetic_mean
+
+    named = varied("torque_ripple@shoulder.sine_1_nm")
+    assert np.array_equal(named, varied("torque_ripple@1.sine_1_nm"))
+    with pytest.raises(StudyError, match=r"expected 1 to \d or a joint name .*shoulder"):
+        varied("torque_ripple@shuolder.sine_1_nm")
+
+
 def test_unstable_loop_is_recorded_run_by_run(tmp_path):
     path = robot_file(tmp_path, "kp = [7.039,", "kp = [-7.039,")
     result = mc.run(small_study(robot=path, runs=5))
