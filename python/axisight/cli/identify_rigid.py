@@ -6,6 +6,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
+import numpy as np
 import typer
 import xarray as xr
 from rich.markup import escape
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
 _FRICTION = ("viscous", "coulomb", "offset")
 # Effects with the opposite sign: the fit has the torque that an axis needs, the effect adds to the command.
 _TURNED = frozenset(effect for effect, _, sign in RIGID_BODY_TERMS.values() if sign < 0)
+# Share of the torque that is left where parameters explain next to nothing. Regressions of arms leave 2 to 20 %.
+_NOTHING = 0.7
 _PARAMETERS = {"estimate": "least squares", "consistent": "bodies that can exist"}
 
 
@@ -163,7 +166,7 @@ def rigid_body_command(
 
     Prints base parameters with standard errors, and torque errors on every log. --out writes a
     robot file. It most often needs --consistent: a plain fit may have bodies that cannot exist.
-    The exit status is 1 if such bodies were not found to full accuracy.
+    The exit status is 1 if such bodies were not found to full accuracy, or if a log is not explained.
     """
     with errors(), as_options(ctx):
         check_out(out, [*logs, *(held_out or [])], columns, force=force)
@@ -193,11 +196,32 @@ def rigid_body_command(
         if combinations:
             say(str(found.estimate.base))
         _show(found)
-        if out is not None:
+        unexplained = "" if unchecked else _unexplained(found)
+        if out is not None and unexplained:
+            say(f"not written: {out}: {unexplained}")
+        elif out is not None:
             source = provenance("rigid-body", paths, options(ctx), columns)
             _write(found, machine, out, source, force=force)
+        if out is not None and unexplained:
+            raise typer.Exit(1)
         if found.consistent is not None and found.consistent.status in ("inaccurate", "failed"):
             raise typer.Exit(1)
+
+
+def _unexplained(found: LogIdentification) -> str:
+    """Return which fitted log the parameters leave as unexplained as no parameters at all; empty without one."""
+    last = found.errors.isel(parameters=-1)
+    for i in np.flatnonzero(~last["held_out"].values):
+        one = last.isel(log=int(i))
+        left, share = one["rms_nm"].values, one["relative_error"].values
+        torque = np.sqrt(np.nansum((left / np.maximum(share, 1e-300)) ** 2))
+        whole = float(np.sqrt(np.sum(left**2)) / max(torque, 1e-300))
+        if whole >= _NOTHING:
+            return (
+                f"the parameters leave {100 * whole:.3g} % of the torque of {one['log'].item()}. Look for a wrong sign, unit or "
+                f"column with `axisight check LOG --robot ROBOT`, or write it all the same by --unchecked"
+            )
+    return ""
 
 
 def _write(

@@ -124,9 +124,25 @@ def test_a_solver_that_stops_short_says_so(rigid, tmp_path: Path, monkeypatch) -
     frame["torque_cmd_2"] *= -1
     frame.to_parquet(tmp_path / "wrong.parquet", index=False)
     wrong = tmp_path / "wrong.parquet"
-    text = run("rigid-body", rigid / "robot.toml", wrong, "--consistent", "-o", out, code=1)
+    arguments = ("rigid-body", rigid / "robot.toml", wrong, "--consistent", "-o", out)
+    text = run(*arguments, "--unchecked", code=1)
     assert "bodies that can exist: inaccurate" in text and "written:" in text
     assert "bodies that can exist: inaccurate" in load_identified(out).provenance.notes
+
+
+def test_torques_of_the_other_sign_are_not_written(rigid, tmp_path: Path) -> None:
+    """No bodies that can exist have them: what the fit leaves is as large as the torque."""
+    out = tmp_path / "out.toml"
+    frame = pd.read_parquet(rigid / "run1.parquet")
+    torques = [name for name in frame if name.startswith("torque_cmd")]
+    frame[torques] *= -1
+    wrong = tmp_path / "wrong.parquet"
+    frame.to_parquet(wrong, index=False)
+    arguments = ("rigid-body", rigid / "robot.toml", wrong, "--consistent", "-o", out)
+    text = run(*arguments, code=1)
+    assert f"not written: {out}: the parameters leave" in text
+    assert "axisight check LOG --robot ROBOT" in text
+    assert not out.exists()
 
 
 def test_no_bodies_are_said_not_to_be_written(rigid, tmp_path: Path) -> None:
