@@ -218,8 +218,8 @@ def _unexplained(found: LogIdentification) -> str:
         whole = float(np.sqrt(np.sum(left**2)) / max(torque, 1e-300))
         if whole >= _NOTHING:
             return (
-                f"the parameters leave {100 * whole:.3g} % of the torque of {one['log'].item()}. Look for a wrong sign, unit or "
-                f"column with `axisight check LOG --robot ROBOT`, or write it all the same by --unchecked"
+                f"the parameters leave {100 * whole:.3g} % of the torque of {one['log'].item()}. Look for a wrong "
+                "sign, unit or column with `axisight check LOG --robot ROBOT`, or write it all the same by --unchecked"
             )
     return ""
 

@@ -117,6 +117,7 @@ def _gathered(files: _Files, path: Path, given: AnyMap | None, robot: Robot | No
             signal = getattr(axis, name)
             if signal is not None:
                 _take_signal(files, result, (name, number), signal)
+    empty = _leave_empty_torques(result)
     _to_torques(result, robot)
     if result.time_s is None:
         _count_time(result, budget)
@@ -124,10 +125,28 @@ def _gathered(files: _Files, path: Path, given: AnyMap | None, robot: Robot | No
         _to_motors(result, robot)
     if given is None:
         result.unused = tuple(sorted(set(files.main) - _used_names(result.columns)))
-    result.doubts = files.doubts()
+    result.doubts = (*files.doubts(), *empty)
     result.findings += [Finding("warning", "file", doubt) for doubt in result.doubts]
     result.most_samples = budget.limit // (8 * (len(result.signals) + 1))
     return result
+
+
+def _leave_empty_torques(result: Gathered) -> tuple[str, ...]:
+    """Take torques that are zero or NaN throughout off a log with targets of its positions; return the doubt.
+
+    Some drivers publish an effort field that nobody fills.
+    """
+    axes = range(len(result.columns.axis))
+    torques = [result.signals.get(("torque", axis)) for axis in axes]
+    targets = all(("position_ref", axis) in result.signals for axis in axes)
+    filled = any(x is None or x.size == 0 or np.nan_to_num(x).any() for x in torques)
+    if not targets or filled:
+        return ()
+    for axis in axes:
+        del result.signals["torque", axis]
+    bare = [axis.model_copy(update={"torque": None}) for axis in result.columns.axis]
+    result.columns = result.columns.model_copy(update={"axis": bare})
+    return ("torques that are zero or NaN throughout count as not logged: targets are compared",)
 
 
 def _count_time(result: Gathered, budget: Budget) -> None:

@@ -1,8 +1,10 @@
 """Every kind of bad log or map gives a LogError that names file, column, expected and got."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from axisight.errors import LogError
@@ -221,3 +223,31 @@ def test_bad_maps(tmp_path, text, words):
 def test_missing_map(tmp_path):
     with pytest.raises(LogError, match=r"nowhere\.toml: column map cannot be read"):
         load_column_map(tmp_path / "nowhere.toml")
+
+
+@pytest.mark.parametrize("nothing", [0.0, np.nan])
+def test_torques_that_nobody_filled_hide_no_targets(tmp_path: Path, nothing: float) -> None:
+    """Some drivers publish an effort field that stays empty."""
+    columns = native_columns()
+    for axis in (1, 2):
+        columns[f"position_ref_{axis}"] = columns[f"position_{axis}"] + 0.01
+        columns[f"torque_cmd_{axis}"] = np.full_like(columns["time_s"], nothing)
+    path = tmp_path / "run.csv"
+    pd.DataFrame(columns).to_csv(path, index=False)
+    log = read_log(path)
+    assert not log.has_torque
+    assert log.position_ref_rad is not None
+    assert any("count as not logged" in note for note in log.notes)
+    report = check_log(path)
+    assert report.ok
+    assert any("count as not logged" in f.message for f in report.findings)
+
+
+def test_one_torque_that_was_filled_keeps_all(tmp_path: Path) -> None:
+    columns = native_columns()
+    for axis in (1, 2):
+        columns[f"position_ref_{axis}"] = columns[f"position_{axis}"] + 0.01
+    columns["torque_cmd_2"] = np.zeros_like(columns["time_s"])
+    path = tmp_path / "run.csv"
+    pd.DataFrame(columns).to_csv(path, index=False)
+    assert read_log(path).has_torque
