@@ -10,6 +10,7 @@ from axisight.logs import Finding as LogFinding
 from axisight.logs import Log
 from axisight.logs.checking import look_at_signals
 from axisight.logs.grid import make_grid
+from axisight.logs.jumps import check_jumps
 from axisight.logs.native import NATIVE_STEMS
 from axisight.logs.rows import check_recorded, check_rows
 from axisight.logs.unit_guess import check_units
@@ -62,12 +63,27 @@ def check_log_alone(log: Log) -> list[Finding]:
         looked += check_recorded(log.recorded)
     elif not log.is_resampled:  # interpolation causes steps and rests of its own
         looked += check_rows(measured, labels, log.sample_time_s)
+    looked += _targets(log)
     out = [named(f, log) for f in looked if f.severity != "ok" and f.name]
     return [
         *(_dead(finding, log) for finding in out),
         *_clipped(log, labels),
         *_velocity(log, slides),
     ]
+
+
+def _targets(log: Log) -> list[LogFinding]:
+    """Return findings about targets of positions that no motion generator makes: wrapped turns, single samples off.
+
+    Targets may rest, step and repeat; they are chosen.
+    """
+    targets = log.position_ref_rad
+    if targets is None or not np.isfinite(targets).all():
+        return []
+    signals = {("position", axis): np.asarray(targets[:, axis]) for axis in range(log.n_axes)}
+    labels = {channel: f"position_ref_{channel[1] + 1}" for channel in signals}
+    found = check_jumps(signals, labels, log.sample_time_s)
+    return [f for f in found if f.name in ("position_spike", "position_wrapped")]
 
 
 def named(finding: LogFinding, log: Log) -> Finding:
