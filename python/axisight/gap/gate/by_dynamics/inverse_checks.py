@@ -49,7 +49,8 @@ _FASTEST_RAD_S = 3000.0
 def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     """Return findings about logs whose torques the simulator's inverse dynamics should explain."""
     motions = [thinned(log) for log in logs]
-    out = check_gravity_share(robot, [at for _, at in motions])
+    without_gravity = check_gravity_share(robot, [at for _, at in motions])
+    out = list(without_gravity)
     if refused(out):
         return out
     for log, (_, at) in zip(logs, motions, strict=True):
@@ -59,7 +60,10 @@ def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
             out = [f for f in out if f.name != name]
     if not refused(out):
         out += check_passive(robot, logs, [at for _, at in motions])
-    return out if refused(out) else [*out, *check_small_errors(robot, motions)]
+    # Small errors are those of a model that is right otherwise.
+    if refused(out) or without_gravity:
+        return out
+    return [*out, *check_small_errors(robot, motions)]
 
 
 def thinned(log: Log) -> tuple[float, Motion]:

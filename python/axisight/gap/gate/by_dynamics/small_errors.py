@@ -36,7 +36,7 @@ _MOST_RAD = 0.6
 # Smallest share of the remaining error that one error must explain. Payloads and other laws of friction explain
 # less, or not evenly.
 _REMOVED = 0.05
-# Logs whose effect has less than this share of the largest energy are not compared.
+# Logs and axes whose effect has less than this share of the largest energy are not compared.
 _TELLS = 0.1
 
 
@@ -52,12 +52,13 @@ def check_small_errors(robot: Robot, motions: Sequence[tuple[float, Motion]]) ->
         names, effects = _effects(robot, sample_time_s, at, base)
         parts.append(_projected(at, base, effects))
     targets = [target for target, _ in parts]
+    shared = [kind == "time_shifted" for kind, _ in names]
     limits = [_MOST_RAD if kind == "position_offset" else _MOST_S for kind, _ in names]
     out = []
     # The error that explains most comes first; the others must explain the rest.
     for _ in range(len(names)):
         columns = [[part[i] for _, part in parts] for i in range(len(names))]
-        best = _strongest(targets, columns, limits)
+        best = _strongest(targets, columns, limits, shared)
         if best is None or best.share < _REMOVED or best.significance < SIGNIFICANT:
             break
         finding = _finding(names[best.index], best.size, best.share)
@@ -137,11 +138,12 @@ class _Strongest:
 
 
 def _strongest(
-    targets: list[Array], columns: list[list[Array]], limits: list[float]
+    targets: list[Array], columns: list[list[Array]], limits: list[float], shared: list[bool]
 ) -> _Strongest | None:
     """Return the error that explains most of the targets, within its limit and alike in all logs; None without one.
 
-    ``targets`` and each of ``columns`` contain one array for each log.
+    ``targets`` and each of ``columns`` contain one array for each log. ``shared``: whether an error is the same on all
+    axes, which then have to agree.
     """
     power = sum(float((t**2).sum()) for t in targets)
     best = None
@@ -162,6 +164,8 @@ def _strongest(
         size = product / energy
         if abs(size) > limits[index] or not _alike(sums.sum(axis=1), size):
             continue
+        if shared[index] and not _alike(_by_axis(column, targets), size):
+            continue
         scatter = np.sqrt(((sums[..., 0] - size * sums[..., 1]) ** 2).sum()) / energy
         share = size * product / max(power, 1e-300)
         if best is None or share > best.share:
@@ -173,10 +177,17 @@ def _cut(x: Array) -> list[Array]:
     return np.array_split(x, PARTS)
 
 
-def _alike(per_log: Array, size: float) -> bool:
-    """Whether all logs with a large enough effect give about the same size; rows: product and energy of a log."""
-    tells = per_log[:, 1] > _TELLS * per_log[:, 1].max()
-    ratio = per_log[tells, 0] / per_log[tells, 1] / (size or 1.0)
+def _by_axis(column: list[Array], targets: list[Array]) -> Array:
+    """Return product and energy of an error on each axis over all logs (n_axes, 2)."""
+    product = sum((c * t).sum(axis=0) for c, t in zip(column, targets, strict=True))
+    energy = sum((c * c).sum(axis=0) for c in column)
+    return np.column_stack([product, energy])
+
+
+def _alike(parts: Array, size: float) -> bool:
+    """Whether all parts with a large enough effect give about the same size; rows: product and energy of each."""
+    tells = parts[:, 1] > _TELLS * parts[:, 1].max()
+    ratio = parts[tells, 0] / parts[tells, 1] / (size or 1.0)
     return bool(np.all((ratio > ALIKE[0]) & (ratio < ALIKE[1])))
 
 
