@@ -43,7 +43,7 @@ _FRICTION = ("viscous", "coulomb", "offset")
 # Effects with the opposite sign: the fit has the torque that an axis needs, the effect adds to the command.
 _TURNED = frozenset(effect for effect, _, sign in RIGID_BODY_TERMS.values() if sign < 0)
 # Share of the torque that is left where parameters explain next to nothing. Regressions of arms leave 2 to 20 %.
-_NOTHING = 0.7
+_HARDLY = 0.7
 _PARAMETERS = {"estimate": "least squares", "consistent": "bodies that can exist"}
 
 
@@ -166,7 +166,7 @@ def rigid_body_command(
 
     Prints base parameters with standard errors, and torque errors on every log. --out writes a
     robot file. It most often needs --consistent: a plain fit may have bodies that cannot exist.
-    The exit status is 1 if such bodies were not found to full accuracy, or if a log is not explained.
+    The exit status is 1 if such bodies were not found to full accuracy, or if nothing is written.
     """
     with errors(), as_options(ctx):
         check_out(out, [*logs, *(held_out or [])], columns, force=force)
@@ -197,29 +197,29 @@ def rigid_body_command(
             say(str(found.estimate.base))
         _show(found)
         unexplained = "" if unchecked else _unexplained(found)
-        if out is not None and unexplained:
-            say(f"not written: {out}: {unexplained}")
-        elif out is not None:
+        if unexplained:
+            say(f"{'' if out is None else f'not written: {out}: '}{unexplained}")
+        if unexplained and out is not None:
+            raise typer.Exit(1)
+        if out is not None:
             source = provenance("rigid-body", paths, options(ctx), columns)
             _write(found, machine, out, source, force=force)
-        if out is not None and unexplained:
-            raise typer.Exit(1)
         if found.consistent is not None and found.consistent.status in ("inaccurate", "failed"):
             raise typer.Exit(1)
 
 
 def _unexplained(found: LogIdentification) -> str:
-    """Return which fitted log the parameters leave as unexplained as no parameters at all; empty without one."""
+    """Return which fitted log the parameters hardly explain, by the rms of its axes' shares; empty without one."""
     last = found.errors.isel(parameters=-1)
     for i in np.flatnonzero(~last["held_out"].values):
         one = last.isel(log=int(i))
-        left, share = one["rms_nm"].values, one["relative_error"].values
-        torque = np.sqrt(np.nansum((left / np.maximum(share, 1e-300)) ** 2))
-        whole = float(np.sqrt(np.sum(left**2)) / max(torque, 1e-300))
-        if whole >= _NOTHING:
+        shares = one["relative_error"].values
+        moved = shares[np.isfinite(shares)]
+        left = float(np.sqrt(np.mean(moved**2))) if moved.size else 0.0
+        if left >= _HARDLY:
             return (
-                f"the parameters leave {100 * whole:.3g} % of the torque of {one['log'].item()}. Look for a wrong "
-                "sign, unit or column with `axisight check LOG --robot ROBOT`, or write it all the same by --unchecked"
+                f"the parameters leave {100 * left:.3g} % of the torque of {one['log'].item()}. Look for a wrong sign, "
+                "unit or column with `axisight check LOG --robot ROBOT`, or write it all the same by --unchecked"
             )
     return ""
 

@@ -139,6 +139,7 @@ def _leave_empty_torques(result: Gathered) -> tuple[str, ...]:
     axes = range(len(result.columns.axis))
     torques = [result.signals.get(("torque", axis)) for axis in axes]
     targets = all(("position_ref", axis) in result.signals for axis in axes)
+    targets = targets and not any(field == "velocity_ref" for field, _ in result.signals)
     filled = any(x is None or x.size == 0 or np.nan_to_num(x).any() for x in torques)
     if not targets or filled:
         return ()
@@ -146,7 +147,7 @@ def _leave_empty_torques(result: Gathered) -> tuple[str, ...]:
         del result.signals["torque", axis]
     bare = [axis.model_copy(update={"torque": None}) for axis in result.columns.axis]
     result.columns = result.columns.model_copy(update={"axis": bare})
-    return ("torques that are zero or NaN throughout count as not logged: targets are compared",)
+    return ("torques that are zero or NaN throughout count as not logged",)
 
 
 def _count_time(result: Gathered, budget: Budget) -> None:

@@ -13,6 +13,9 @@ from axisight.logs.jumps import check_jumps
 from axisight.logs.log import Floats
 from axisight.logs.recorded import RecordedRows
 
+# Shortest time between two stamps that counts, in usual steps.
+_SHORTEST = 0.1
+
 
 def check_rows(
     signals: Mapping[Channel, Floats], labels: Mapping[Channel, str], sample_time_s: float
@@ -30,8 +33,24 @@ def check_rows(
 
 
 def check_recorded(rows: RecordedRows) -> list[Finding]:
-    """Return findings as `check_rows` about rows with uneven stamps; times count rows at the usual step."""
+    """Return findings as `check_rows` about rows with uneven stamps; times count rows at the usual step.
+
+    Steps of positions count as if they had taken the usual time, so that a late stamp, or a row that the stamps show
+    to be missing, makes no jump.
+    """
     if len(rows.stamps_s) < 2:
         return []
-    usual_s = float(np.median(np.diff(rows.stamps_s)))
-    return check_rows(rows.signals, rows.labels, usual_s)
+    took_s = np.diff(rows.stamps_s)
+    usual_s = float(np.median(took_s))
+    # Two stamps may fall together where messages queue; their step is no faster for that.
+    factor = usual_s / np.maximum(took_s, _SHORTEST * usual_s)
+    signals = {
+        channel: _paced(values, factor) if channel[0] == "position" else values
+        for channel, values in rows.signals.items()
+    }
+    return check_rows(signals, rows.labels, usual_s)
+
+
+def _paced(values: Floats, factor: Floats) -> Floats:
+    """Return a position (n,) with its steps multiplied by factors (n - 1,)."""
+    return np.concatenate([values[:1], values[0] + np.cumsum(np.diff(values) * factor)])

@@ -6,7 +6,8 @@ MuJoCo's own dry friction. Its runs in MuJoCo have all of it, so that none of it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
@@ -21,31 +22,63 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
+SAYS = (
+    "Your simulator is the MJCF itself: it was run in MuJoCo under the targets of the logs, with what its import "
+    "leaves out."
+)
+"""Sentence for the checks of a verdict."""
+
 # Time [s] for which the first target is held before a run: the arm comes to rest where MuJoCo has it.
 _SETTLES_S = 5.0
 # Largest relative difference between the sample time of a log and a multiple of MuJoCo's time step.
 _WHOLE = 1e-6
+# Largest `mjtTrn` of an actuator that acts on a joint: in its frame, or in that of its parent.
+_ON_JOINT = 1
 
 
 def runs_in_mujoco(robot: Robot, logs: Sequence[Log]) -> list[Log]:
     """Return runs of the MJCF of a robot under the targets of ``logs``, one for each, with positions and no torque.
 
-    Empty where the robot is no mere import of an MJCF with position actuators, MuJoCo is not installed, the file has
-    other joints or motors than the axes of the robot, a log has torques or no targets, or a run is unstable.
+    Empty where that is no run of the user's simulator:
+
+    - the robot is no mere import of an MJCF with ``<position>`` actuators, one on each axis and none elsewhere;
+    - MuJoCo is not installed, or the file is gone;
+    - a log has torques, no targets, values that are not finite, or another number of axes;
+    - a run is unstable.
     """
     source = robot.imported_from
     told = source is not None and robot.stepped is not None and robot.told_positions
-    if not told or find_spec("mujoco") is None:
-        return []
-    if any(log.has_torque or log.position_ref_rad is None for log in logs):
+    if not told or find_spec("mujoco") is None or not all(_has_targets(x, robot) for x in logs):
         return []
     mujoco = import_module("mujoco")
-    model = mujoco.MjModel.from_xml_path(str(source))
-    if not model.nq == model.nv == model.nu == robot.n_axes:
+    try:
+        motors = _Motors(mujoco.MjModel.from_xml_path(str(source)), robot)
+    except (ValueError, KeyError):
+        # Of a file that was changed or moved since, and of joints without names.
         return []
-    motors = _Motors(model, robot)
-    runs = [run for log in logs if (run := motors.run(mujoco, log)) is not None]
+    if not motors.are_all:
+        return []
+    with _quiet(mujoco):
+        runs = [run for log in logs if (run := motors.run(mujoco, log)) is not None]
     return runs if len(runs) == len(logs) else []
+
+
+@contextmanager
+def _quiet(mujoco: Any) -> Iterator[None]:
+    """Keep MuJoCo from writing warnings about unstable runs to the screen and to a file in the working folder."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _text: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+def _has_targets(log: Log, robot: Robot) -> bool:
+    """Whether a log of the robot has finite positions and targets, and no torque."""
+    if log.has_torque or log.position_ref_rad is None or log.n_axes != robot.n_axes:
+        return False
+    return bool(np.isfinite(log.position_ref_rad).all() and np.isfinite(log.position_rad).all())
 
 
 class _Motors:
@@ -54,6 +87,10 @@ class _Motors:
     def __init__(self, model: Any, robot: Robot) -> None:
         self.model = model
         joints = [model.joint(name) for name in robot.axis_names]
+        on_joints = bool((model.actuator_trntype <= _ON_JOINT).all())
+        only_axes = model.nq == model.nv == model.nu == robot.n_axes
+        # An activation is a state of its own, such as the target of a speed servo.
+        self.are_all = only_axes and on_joints and model.na == 0
         self.places = np.array([int(joint.qposadr[0]) for joint in joints])
         of_joint = {int(model.actuator_trnid[k, 0]): k for k in range(model.nu)}
         self.controls = np.array([of_joint[int(joint.id)] for joint in joints])
@@ -78,8 +115,9 @@ class _Motors:
             data.ctrl[self.controls] = wanted
             mujoco.mj_step(self.model, data, steps)
         # MuJoCo begins anew after an unstable step, and counts it.
-        bad = mujoco.mjtWarning.mjWARN_BADQACC
-        if data.warning[bad].number or not np.isfinite(angle).all():
+        kinds = mujoco.mjtWarning
+        unstable = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
+        if any(data.warning[kind].number for kind in unstable):
             return None
         return replace(
             log,

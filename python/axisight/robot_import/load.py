@@ -75,7 +75,7 @@ def import_robot(
         drives = drive_data(source, drives)
     # Drive data change what the file says.
     unchanged = isinstance(source, str | Path) and drives == DriveData()
-    alone = Path(source) if unchanged else None
+    alone = Path(source).resolve() if unchanged else None
     tree, chain = bodies_and_chain(source, drives, base=base, tip=tip)
 
     def built(step_s: float | None) -> Robot:

@@ -232,6 +232,7 @@ def test_torques_that_nobody_filled_hide_no_targets(tmp_path: Path, nothing: flo
     for axis in (1, 2):
         columns[f"position_ref_{axis}"] = columns[f"position_{axis}"] + 0.01
         columns[f"torque_cmd_{axis}"] = np.full_like(columns["time_s"], nothing)
+        del columns[f"velocity_ref_{axis}"]
     path = tmp_path / "run.csv"
     pd.DataFrame(columns).to_csv(path, index=False)
     log = read_log(path)

@@ -100,6 +100,27 @@ def test_sound_rows_with_uneven_stamps_have_no_fault(tmp_path, seed):
     assert check_log_alone(read_log(path, MAP)) == []
 
 
+@pytest.mark.parametrize("share", [0.001, 0.005, 0.03, 0.1])
+def test_rows_that_the_stamps_show_to_be_missing_are_no_jumps(tmp_path, share):
+    """A recorder under load drops rows; resampling bridges them, with a warning."""
+    rows = recorded()
+    kept = np.random.default_rng(5).random(N) > share
+    path = written(rows[kept], tmp_path / "run.csv")
+    assert {f.name for f in check_log(path, MAP).findings if f.severity == "error"} == set()
+    assert [f for f in check_log_alone(read_log(path, MAP)) if f.severity == "refuse"] == []
+
+
+@pytest.mark.parametrize("jitter", [0.3, 0.45])
+def test_late_stamps_are_no_jumps(tmp_path, jitter):
+    rows = recorded()
+    even = np.arange(N) * 0.01
+    rows[:, 0] = even + 0.01 * jitter * np.random.default_rng(6).uniform(-1, 1, N)
+    rows[:, 0] -= rows[0, 0]
+    rows[:, 1] = np.sin(1.1 * rows[:, 0]) + 0.4 * np.sin(3.7 * rows[:, 0] + 1.0)
+    path = written(rows, tmp_path / "run.csv")
+    assert {f.name for f in check_log(path, MAP).findings if f.severity == "error"} == set()
+
+
 def test_a_part_without_the_fault_is_sound(tmp_path):
     log = read_log(written(frozen(recorded()), tmp_path / "run.csv"), MAP)
     assert check_log_alone(log.part(10.0)) == []

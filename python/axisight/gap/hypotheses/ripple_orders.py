@@ -118,8 +118,8 @@ def strongest_orders(
     """Return up to ``count`` integer orders of the motor angle, the first found first.
 
     ``responses``: for each log, the transfer from an error that repeats with the motor angle to the residual, at the
-    frequencies `Turning.frequency_hz`. ``least_waves``: orders with fewer waves over the travel are left out, and those
-    that differ from one before by less than a wave: the travel does not resolve them.
+    frequencies `Turning.frequency_hz`. ``least_waves``: orders with fewer waves over the travel, or less than a wave
+    from an order before, are fitted and not returned: the travel does not resolve them.
 
     Method: least squares of the residuals of all logs on cosine and sine of ``n phi`` after the response, with one
     amplitude and phase for all logs. One order after another is added, each fitted with those before it (orthogonal
@@ -137,17 +137,19 @@ def strongest_orders(
         along += log.along(response, residual)
         power += float(residual @ residual)
     turns = max(float(np.ptp(log.angle_rad)) for log in logs) / (2 * np.pi)
-    orders = np.arange(1, HIGHEST_ORDER + 1)
-    resolved = orders * turns >= least_waves
+    fitted: list[int] = []
     found: list[int] = []
-    while len(found) < count:
-        if least_waves and found:
-            resolved &= np.abs(orders - found[-1]) * turns >= 1.0
-        gains = np.where(resolved, _gains(normal, along, found), 0.0)
+    while len(found) < count and len(fitted) < 2 * count:
+        gains = _gains(normal, along, fitted)
         best = int(np.argmax(gains))
         if not gains[best] > _WORTH * power:
             break
-        found.append(best + 1)
+        order = best + 1
+        near = any(abs(order - other) * turns < 1.0 for other in fitted)
+        if not least_waves or (order * turns >= least_waves and not near):
+            found.append(order)
+        # What the travel does not resolve is fitted all the same: another order would only stand for it.
+        fitted.append(order)
         power -= float(gains[best])
     return found
 

@@ -89,8 +89,8 @@ def _presliding(trial: StartContext) -> Hypothesis:
     )
 
 
-# Smallest number of waves over the travel of an axis; a longer wave could have any shape.
-_LEAST_WAVES = 2.0
+# Smallest number of waves over the travel of an axis, and of a slide; a longer wave could have any shape.
+_LEAST_WAVES, _SLIDE_WAVES = 1.0, 2.0
 
 
 def _waves(trial: StartContext) -> Hypothesis | None:
@@ -111,7 +111,8 @@ def _waves(trial: StartContext) -> Hypothesis | None:
 def _orders(trial: StartContext, count: int) -> list[int]:
     """Return the strongest orders of the residual over the motor angle, given the response to the effect."""
     logs, responses = trial.turned()
-    return strongest_orders(logs, responses, count=count, least_waves=_LEAST_WAVES)
+    least = _SLIDE_WAVES if trial.robot.axis_is_prismatic[trial.index] else _LEAST_WAVES
+    return strongest_orders(logs, responses, count=count, least_waves=least)
 
 
 # Order of a harmonic drive: two waves per motor turn.

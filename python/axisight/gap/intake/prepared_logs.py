@@ -26,6 +26,7 @@ from axisight.gap.simulator.start_poses import at_their_poses
 from axisight.gap.views.choice import view_of
 from axisight.gap.views.view import View
 from axisight.logs import Log
+from axisight.mujoco.rollout import SAYS as RUN_IN_MUJOCO
 from axisight.mujoco.rollout import runs_in_mujoco
 from axisight.robot import Robot
 
@@ -40,6 +41,7 @@ class PreparedLogs:
     - ``nominal``: the constants with which currents of unknown torque constants were read.
     - ``simulator``: how well the robot reproduces the user's own simulator, once that has been compared.
     - ``beside``: logs of the user's own simulator, cut like the measured ones.
+    - ``in_mujoco``: whether these are runs in MuJoCo that the diagnosis made itself.
     - ``held``: by how much torques act later than they were logged, where that was corrected.
     """
 
@@ -53,6 +55,7 @@ class PreparedLogs:
     simulator: Reproduction | None = None
     beside: tuple[Log, ...] = ()
     held: HeldCommands | None = None
+    in_mujoco: bool = False
 
     def view(self, settings: Settings) -> View:
         """Return the comparison of simulator and logs."""
@@ -112,6 +115,7 @@ class PreparedLogs:
         """Return sentences about how the logs were prepared."""
         own_poses = any(log.start_rad is not None and log.run_up is None for log in self.estimation)
         said = [
+            RUN_IN_MUJOCO if self.in_mujoco else "",
             "" if self.simulator is None else user_simulator.said(self.simulator, compared),
             FROM_OWN_POSES if own_poses and mode == "closed_loop" else "",
             SAYS if self.recovered else "",
@@ -133,7 +137,8 @@ def behind_gate(
     MuJoCo, as far as `runs_in_mujoco` can.
     """
     # Whatever an import leaves out of an MJCF is in its runs in MuJoCo.
-    simulated = simulated or runs_in_mujoco(robot, [*estimation, *validation])
+    in_mujoco = [] if simulated else runs_in_mujoco(robot, [*estimation, *validation])
+    simulated = simulated or in_mujoco
     robot, slowed = with_bristles_followed(robot)
     read = in_torques(robot, estimation, validation)
     if read.nominal and simulated:
@@ -159,7 +164,9 @@ def behind_gate(
     # Logs of the user's own simulator may hold their commands, too: the difference of both is compared.
     inverse = commanded is None and not beside and not is_closed_loop(robot, logs)
     held = held_commands(robot, logs) if inverse else None
-    logs = logs if held is None else where_they_act(logs, held)
+    if held is not None:
+        logs = where_they_act(logs, held)
+        noted = tuple(f for f in noted if f.name != "time_shifted" or f.axis is not None)
     return PreparedLogs(
         robot,
         logs[:n],
@@ -170,4 +177,5 @@ def behind_gate(
         read.nominal,
         beside=tuple(beside),
         held=held,
+        in_mujoco=bool(in_mujoco),
     )

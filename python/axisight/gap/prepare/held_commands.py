@@ -22,9 +22,8 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Largest time [samples] by which a command acts later than it is logged, with the error of an estimate. A torque
-# that is logged late is not corrected: an elastic gear looks alike on all axes.
-_MOST_SAMPLES = 1.1
+# Range of the time [samples] by which a held command acts later than it is logged. A drive's delay is another one.
+_SAMPLES = (0.3, 0.7)
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,8 @@ def held_commands(robot: Robot, logs: Sequence[Log]) -> HeldCommands | None:
         return None
     later_s = float(weight @ own_s / weight.sum())
     least_s = SIGNIFICANT / float(np.sqrt(weight.sum()))
-    if not least_s <= later_s <= _MOST_SAMPLES * logs[0].sample_time_s:
+    first_s, last_s = (x * logs[0].sample_time_s for x in _SAMPLES)
+    if not max(least_s, first_s) <= later_s <= last_s:
         return None
     # An axis that tells needs half of the significance of all. An effect that the simulator lacks on some axes seems
     # to shift these axes alone.

@@ -35,7 +35,7 @@ def at_their_poses(robot: Robot, logs: Sequence[Log]) -> list[Log]:
         return list(logs)
     begins = [log.position_rad[0] for log in logs if log.run_up is None]
     if begins and not robot.states_operating_point:
-        begins.append(robot.equilibrium()["motor_angle_rad"].values)
+        begins.append(robot.operating_point / robot.gear_ratio)
     apart = np.ptp(begins, axis=0) * np.abs(robot.gear_ratio) if begins else np.zeros(1)
     if not np.any(apart > OFFSET_RAD):
         return list(logs)

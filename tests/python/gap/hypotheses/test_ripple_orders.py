@@ -36,21 +36,36 @@ def test_noise_alone_has_no_order():
     assert strongest_orders([log], [flat(log)], count=3) == []
 
 
+def swinging(turns: float, residual_of) -> Turning:
+    """A motor that swings over a part of a turn."""
+    time = np.arange(N) * T
+    angle = np.pi * turns * np.sin(0.7 * time)
+    return Turning(residual_of(angle), angle, np.gradient(angle, T), T)
+
+
 def test_orders_that_the_travel_does_not_resolve_are_left_out():
     """Over a tenth of a turn, waves of order 1 may be a spring, and those of 40 and 45 differ by half a wave."""
-    time = np.arange(N) * T
-    angle = 0.1 * np.pi * np.sin(0.7 * time)
-
-    def swinging(residual):
-        return Turning(residual, angle, np.gradient(angle, T), T)
-
-    slow = swinging(np.cos(angle + 0.3))
-    assert strongest_orders([slow], [flat(slow)], count=1)[0] < 20
-    assert all(n >= 20 for n in strongest_orders([slow], [flat(slow)], count=3, least_waves=2.0))
-    both = swinging(np.cos(40 * angle) + 0.6 * np.sin(45 * angle))
-    (first, *others) = strongest_orders([both], [flat(both)], count=3, least_waves=2.0)
+    slow = swinging(0.1, lambda angle: np.cos(angle + 0.3))
+    assert strongest_orders([slow], [flat(slow)], count=1)[0] < 10
+    assert strongest_orders([slow], [flat(slow)], count=3, least_waves=1.0) == []
+    both = swinging(0.1, lambda angle: np.cos(40 * angle) + 0.6 * np.sin(45 * angle))
+    (first, *others) = strongest_orders([both], [flat(both)], count=3, least_waves=1.0)
     assert abs(first - 40) <= 5
     assert all(abs(other - first) >= 10 for other in others)
+
+
+def test_a_ripple_is_found_beside_what_the_travel_does_not_resolve():
+    mixed = swinging(0.3, lambda angle: np.cos(angle) + 0.2 * np.cos(24 * angle + 1.0))
+    found = strongest_orders([mixed], [flat(mixed)], count=3, least_waves=1.0)
+    assert 24 in found
+    assert min(found) >= 4
+
+
+@pytest.mark.parametrize(("order", "turns"), [(2, 0.9), (2, 0.6), (1, 1.5)])
+def test_low_orders_on_a_travel_that_resolves_them_are_found(order: int, turns: float):
+    rng = np.random.default_rng(4)
+    log = swinging(turns, lambda angle: np.cos(order * angle + 0.4) + 0.02 * rng.normal(size=N))
+    assert strongest_orders([log], [flat(log)], count=1, least_waves=1.0) == [order]
 
 
 def test_logs_share_amplitude_and_phase():

@@ -27,7 +27,9 @@ def check_gravity_share(robot: Robot, motions: Sequence[Motion]) -> list[Finding
     acts on it, on the rest of the prediction, on friction and an offset. A perfect counterbalance gives the same on
     one axis. Of an arm, two axes must show no weight; the finding about a machine of one axis is a flag.
     """
-    parts = [_parts(robot, at) for at in motions]
+    # Springs and counterbalances of the robot file are no weight.
+    bare = robot.with_effects([])
+    parts = [_parts(bare, at) for at in motions]
     factors = [both for axis in range(robot.n_axes) if (both := _factors(parts, axis)) is not None]
     if not factors or (len(factors) == 1 < robot.n_axes):
         return []
