@@ -9,6 +9,7 @@ from test_computed_torque import arm
 from test_explore_modes import SAMPLE, logs_of
 
 from axisight import Settings, diagnose, plot_overlay
+from axisight.gap.prepare.held_commands import held_commands, where_they_act
 from axisight.logs import lowpass
 from axisight.report import render_report
 
@@ -22,7 +23,12 @@ def found(request, tmp_path_factory):
     diagnosis = diagnose(
         robot=robot, estimation=logs[:2], validation=logs[2:], settings=settings, signals=True
     )
-    return diagnosis, logs[2]
+    if request.param == "positions":
+        return diagnosis, logs[2]
+    # The engine holds commands: torques are compared, and drawn, where they act.
+    held = held_commands(robot, logs)
+    assert held is not None and any(held.says() == check for check in diagnosis.checks)
+    return diagnosis, where_they_act(logs, held)[2]
 
 
 def test_rms_that_is_drawn_is_the_gap_of_the_table(found):
