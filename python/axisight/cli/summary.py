@@ -93,11 +93,12 @@ def next_steps(found: Diagnosis, given: Collection[str] = (), command: str = "")
         limits = ["--verbose lists the smallest effects that these logs would show."]
         return [*out, "Nothing to correct.", *(limits if found.detection_limits else [])]
     told = [text for option, text in offers.items() if option not in given]
-    if found.verdict == "explained" and "--write-model" in given:
-        told.append("Diagnose again with the model that was written: the verdict should be none.")
     if found.verdict in ("unknown", "undecidable"):
         told.append("--explain says what was tried.")
-    return [*out, *(f"{command} {text}".strip() for text in told)]
+    out += [f"{command} {text}".strip() for text in told]
+    if found.verdict == "explained" and "--write-model" in given:
+        out.append("Diagnose again with the model that was written: the verdict should be none.")
+    return out
 
 
 def _can_be_designed(found: Diagnosis) -> bool:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from axisight.gap.facts.faults import Finding, GateSeverity
 from axisight.gap.gate.by_dynamics.torque_fit import EXPLAINED, SAME, nuisance
-from axisight.gap.gate.by_dynamics.undone_mistakes import GRAVITY, predict
+from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from axisight.gap.signals.motion import Motion
 from axisight.robot import Robot
 
@@ -36,11 +36,11 @@ def check_gravity_share(robot: Robot, motions: Sequence[Motion]) -> list[Finding
     if not all(abs(weight) < _NONE and SAME[0] < rest < SAME[1] for weight, rest in factors):
         return []
     severity: GateSeverity = "refuse" if robot.n_axes > 1 else "flag"
-    words, _ = GRAVITY["torque_without_gravity"]
     seen = ", ".join(f"{100 * weight:.2g}" for weight, _ in factors)
     message = (
         f"expected torques that hold the arm against gravity, got {seen} % of the weight on the axes that carry "
-        f"one. Did the driver take gravity off? Then {words}"
+        "one. Did the driver take gravity off? Then set gravity to zero in the robot file, or log the torque with "
+        "gravity"
     )
     return [Finding("torque_without_gravity", severity, message, None, None, "torque_cmd")]
 

@@ -12,13 +12,7 @@ from axisight.gap.gate.by_dynamics.friction_sign import check_passive
 from axisight.gap.gate.by_dynamics.gravity_share import check_gravity_share
 from axisight.gap.gate.by_dynamics.small_errors import check_small_errors
 from axisight.gap.gate.by_dynamics.torque_fit import EXPLAINED, SAME, TorqueFit, torque_fit
-from axisight.gap.gate.by_dynamics.undone_mistakes import (
-    GRAVITY,
-    Mistake,
-    predict,
-    undone,
-    with_gravity,
-)
+from axisight.gap.gate.by_dynamics.undone_mistakes import Mistake, predict, undone, with_gravity
 from axisight.gap.signals.lowpass_cutoff import highest_cutoff_hz
 from axisight.gap.signals.motion import Motion, motion
 from axisight.gap.signals.unit_scales import scale_name
@@ -55,9 +49,8 @@ def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
         return out
     for log, (_, at) in zip(logs, motions, strict=True):
         out += _one_log(robot, log, at)
-    for name in GRAVITY:
-        if any(f.name == name for f in out) and not _gravity_off(robot, motions, name):
-            out = [f for f in out if f.name != name]
+    if any(f.name == "gravity_flipped" for f in out) and not _gravity_off(robot, motions):
+        out = [f for f in out if f.name != "gravity_flipped"]
     if not refused(out):
         out += check_passive(robot, logs, [at for _, at in motions])
     # Small errors are those of a model that is right otherwise.
@@ -114,12 +107,11 @@ def _most_likely(robot: Robot, at: Motion, given: TorqueFit) -> Mistake | None:
     return best if enough and explains else None
 
 
-def _gravity_off(robot: Robot, motions: Sequence[tuple[float, Motion]], name: str) -> bool:
-    """Whether gravity as the mistake ``name`` has it explains all logs in which gravity matters."""
-    _, factor = GRAVITY[name]
+def _gravity_off(robot: Robot, motions: Sequence[tuple[float, Motion]]) -> bool:
+    """Whether gravity with the other sign explains all logs in which gravity matters."""
     for _, at in motions:
         given = torque_fit(at[3], predict(robot, at), at).total
-        removed = given - with_gravity(robot, at, factor).total
+        removed = given - with_gravity(robot, at, -1.0).total
         if abs(removed) > _LEAST_REMOVED and removed < _REMOVED * given:
             return False
     return True

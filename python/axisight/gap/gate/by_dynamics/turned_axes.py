@@ -13,7 +13,7 @@ import numpy as np
 from axisight.gap.facts.faults import Finding
 from axisight.gap.gate.by_dynamics.inverse_checks import thinned
 from axisight.gap.gate.by_dynamics.torque_fit import EXPLAINED, TorqueFit, torque_fit
-from axisight.gap.gate.by_dynamics.undone_mistakes import predict, undone
+from axisight.gap.gate.by_dynamics.undone_mistakes import predict, undone, with_gravity
 from axisight.gap.signals.motion import Motion
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -47,7 +47,9 @@ def check_turned_axes(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
 
 
 def _another_explains(robot: Robot, motions: Sequence[Motion], left: float) -> bool:
-    """Whether another single mistake, undone in all logs, leaves less than the turned axis."""
+    """Whether another single mistake in all logs, or torque without gravity, leaves less than the turned axis."""
+    if sum(with_gravity(robot, at, 0.0).total for at in motions) < left:
+        return True
     return any(
         sum(mistake.fit.total for mistake in in_all) < left
         for in_all in zip(*(undone(robot, at) for at in motions), strict=True)

@@ -26,15 +26,6 @@ _UNITS = {
 # Smallest logarithm of a gear ratio for which the two sides of the gear differ.
 _GEARED = 0.1
 
-GRAVITY = {
-    "gravity_flipped": ("change the sign of gravity in the robot file", -1.0),
-    "torque_without_gravity": (
-        "set gravity to zero in the robot file, or log the torque with gravity",
-        0.0,
-    ),
-}
-"""Mistakes of gravity: what undoes them in words, and the factor of the simulator's gravity that does."""
-
 
 @dataclass(frozen=True)
 class Mistake:
@@ -82,8 +73,8 @@ def undone(robot: Robot, at: Motion) -> Iterator[Mistake]:
     if np.any(np.abs(np.log(np.abs(robot.gear_ratio))) > _GEARED):
         words = "divide by the gear ratios"
         yield Mistake("position_joint_side", "position", every, words, moved(1 / robot.gear_ratio))
-    for name, (words, turns) in GRAVITY.items():
-        yield Mistake(name, "gravity", every, words, with_gravity(robot, at, turns))
+    turned = with_gravity(robot, at, -1.0)
+    yield Mistake("gravity_flipped", "gravity", every, "change the sign of gravity", turned)
 
 
 def predict(robot: Robot, at: Motion) -> Array:
