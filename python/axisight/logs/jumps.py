@@ -21,7 +21,7 @@ Ints = NDArray[np.int64]
 # A speed is compared with the median of seven neighbours. If a log resolves the motion, no drive changes
 # the speed of an axis by three tenths of its top speed within one sample. For coarse logs and for noise,
 # the limit is twenty times the median deviation (13 standard deviations).
-_NEIGHBOURS = 7
+NEIGHBOURS = 7
 _SHARE_OF_TOP = 0.3
 _USUAL = 20.0
 # On a slow axis, a coarse encoder or numbers with few digits make the speed jump by one or two steps.
@@ -92,7 +92,7 @@ def _spiked(
 def position_jumps(values: Floats, axis: int, known: list[int]) -> tuple[list[Jump], float]:
     """Return the jumps of a position (n,) that are not near the samples `known`, and its top step."""
     step = np.diff(values)
-    usual = scipy.ndimage.median_filter(step, _NEIGHBOURS, mode="nearest")
+    usual = scipy.ndimage.median_filter(step, NEIGHBOURS, mode="nearest")
     off = step - usual
     top = float(np.quantile(np.abs(usual), 0.999))
     least = max(_SHARE_OF_TOP * top, _USUAL * float(np.median(np.abs(off))), 1e-9 * np.ptp(values))
@@ -213,7 +213,7 @@ def _count_spikes(events: list[list[Jump]]) -> int:
 def _alone(jump: Jump, tops: Mapping[int, float], positions: Mapping[int, Floats]) -> bool:
     """Whether missing rows are ruled out, because they would also have made another axis jump."""
     rows = abs(jump.size) / max(abs(jump.speed), 1e-3 * tops[jump.axis])
-    around = slice(max(0, jump.index - _NEIGHBOURS), jump.index + _NEIGHBOURS)
+    around = slice(max(0, jump.index - NEIGHBOURS), jump.index + NEIGHBOURS)
     return any(
         rows * abs(float(np.median(np.diff(values[around])))) > 2 * _SHARE_OF_TOP * tops[axis]
         for axis, values in positions.items()

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import scipy
 
 from axisight.logs.findings import Finding
 from axisight.logs.frozen import check_frozen, check_repeated_rows
 from axisight.logs.gather import Channel
-from axisight.logs.jumps import check_jumps
+from axisight.logs.jumps import NEIGHBOURS, check_jumps
 from axisight.logs.log import Floats
 from axisight.logs.recorded import RecordedRows
 
@@ -35,8 +36,9 @@ def check_rows(
 def check_recorded(rows: RecordedRows) -> list[Finding]:
     """Return findings as `check_rows` about rows with uneven stamps; times count rows at the usual step.
 
-    Steps of positions count as if they had taken the usual time, so that a late stamp, or a row that the stamps show
-    to be missing, makes no jump.
+    A stamp can be late although its sample was taken in time, and a sample can be late as its stamp says. Therefore
+    each step of a position counts as it is or as if it had taken the usual time, whichever is nearer to its
+    neighbours: neither a late stamp nor a row that the stamps show to be missing makes a jump.
     """
     if len(rows.stamps_s) < 2:
         return []
@@ -52,5 +54,9 @@ def check_recorded(rows: RecordedRows) -> list[Finding]:
 
 
 def _paced(values: Floats, factor: Floats) -> Floats:
-    """Return a position (n,) with its steps multiplied by factors (n - 1,)."""
-    return np.concatenate([values[:1], values[0] + np.cumsum(np.diff(values) * factor)])
+    """Return a position (n,) with its steps multiplied by factors (n - 1,) where that makes them more like others."""
+    step = np.diff(values)
+    paced = step * factor
+    usual = scipy.ndimage.median_filter(paced, NEIGHBOURS, mode="nearest")
+    nearer = np.abs(paced - usual) < np.abs(step - usual)
+    return np.concatenate([values[:1], values[0] + np.cumsum(np.where(nearer, paced, step))])
