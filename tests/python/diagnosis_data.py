@@ -30,7 +30,7 @@ REGIMES = {
     "acceleration": ["low", "middle", "high"],
     "time": ["first third", "second third", "last third"],
 }
-VERDICTS = ("none", "explained", "unknown", "undecidable")
+VERDICTS = ("none", "explained", "explained_in_part", "unknown", "undecidable")
 
 
 def shares(dim: str, labels: list[str], n_axes: int, seed: int, strength: float) -> xr.Dataset:
@@ -191,6 +191,11 @@ def of(verdict: str) -> Diagnosis:
             headline="Torque constant of axis 2 and payload explain the gap equally.",
             ranking=ranking(0.48), equivalent=(("torque_constant@2", "payload"),),
             next_experiment="Hold still in two poses with a known payload of at least 5 kg.",
+        )  # fmt: skip
+    if verdict == "explained_in_part":
+        return replace(
+            base, verdict=verdict, gap=gap(0.31, 0.29, 0.15, 0.05, 3),
+            next_experiment="Record axis 2 alone at three amplitudes.",
         )  # fmt: skip
     common = {"verdict": verdict, "causes": ()}
     if verdict == "none":

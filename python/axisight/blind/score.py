@@ -22,6 +22,8 @@ SEVERE = 3.0
 SETTING = ("engine", "arm", "motions", "references")
 """Properties of a case's draw, as named in its truth."""
 # For truths that do not state every property.
+# Verdicts that name causes as sure.
+_SURE = ("explained", "explained_in_part")
 _ALWAYS = {"references": "logged"}
 # Error of the gap's reduction that still counts as right.
 _POINTS = 0.05
@@ -303,7 +305,7 @@ def figures(judged: Sequence[Judged]) -> dict[str, Share]:
         "false alarms on nothing withheld": share(nothing, [bool(j.named) for j in nothing]),
         "out of the library: unknown": share(unknown, [j.right for j in unknown]),
         "wrong cause explained": share(
-            judged, [j.verdict == "explained" and not set(j.named) <= set(j.truth) for j in judged]
+            judged, [j.verdict in _SURE and not set(j.named) <= set(j.truth) for j in judged]
         ),
         "missed at twice the detection limit said of it": Share(
             sum(over >= 2 for j in judged for over in j.missed.values()),

@@ -52,6 +52,7 @@ EXIT_CODES: dict[VerdictKind, int] = {
     "explained": 10,
     "unknown": 11,
     "undecidable": 12,
+    "explained_in_part": 13,
 }
 """Exit status by verdict, with ``--exit-code``; 1 and 2 are reserved for errors."""
 
@@ -134,7 +135,8 @@ def diagnose_command(
         typer.Option(
             "--exit-code",
             rich_help_panel=OUTPUT,
-            help="Exit with the verdict: 0 none, 10 explained, 11 unknown, 12 undecidable. Without it 0.",
+            help="Exit with the verdict: 0 none, 10 explained, 11 unknown, 12 undecidable, 13 explained in part. "
+            "Without it 0.",
         ),
     ] = False,
     force: Force = False,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 from axisight.gap import Diagnosis, Finding
-from axisight.gap.facts.axis_names import axis_label
+from axisight.gap.facts.axis_names import axis_label, in_words
 from axisight.gap.facts.compared_quantity import FROM_POSITIONS, torque_of
 from axisight.gap.facts.result import Cause
 from axisight.gap.facts.wording import LARGEST, percent
@@ -110,7 +110,7 @@ def _them(found: Diagnosis) -> str:
 
 
 def _verdict(found: Diagnosis, width: int, _detail: _Detail) -> list[str]:
-    return _folded(f"{found.verdict}: {found.headline}", width, indent="")
+    return _folded(f"{in_words(found.verdict)}: {found.headline}", width, indent="")
 
 
 def _causes(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
@@ -150,7 +150,7 @@ def _gaps(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
         table.append((f"axis {axis_label(i, found.joints)}", *map(_share, stages), verdict))
     if len(rows) > 1:
         whole = (gap.before, gap.refitted, gap.after, gap.floor)
-        table.append(("all axes", *map(_share, whole), found.verdict))
+        table.append(("all axes", *map(_share, whole), in_words(found.verdict)))
     out = _columns(table, width, right=range(1, 5))
     if len(shown) < len(rows):
         out.append(f"and {len(rows) - len(shown)} more axes, with less of a gap: --verbose")

@@ -13,6 +13,7 @@ from axisight.documents import parse_json, read_text
 from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.explore.choices import Place, at_place
+from axisight.gap.facts.schema import READABLE_SCHEMAS
 from axisight.logs.columns import describe_validation
 
 # Verdicts are a few kilobytes.
@@ -112,8 +113,9 @@ def read_said(path: Path | str) -> Said:
 def said(document: Any, source: str = "verdict") -> Said:
     """Return the content of a verdict's document; raises InputError naming ``source`` and field."""
     schema = document.get("schema") if isinstance(document, dict) else None
-    if schema != "axisight.verdict/1":
-        raise InputError(f"{source}: schema: expected axisight.verdict/1, got {shown(schema)}")
+    if schema not in READABLE_SCHEMAS:
+        wanted = " or ".join(READABLE_SCHEMAS)
+        raise InputError(f"{source}: schema: expected {wanted}, got {shown(schema)}")
     try:
         read = _Verdict.model_validate(document)
     except ValidationError as error:

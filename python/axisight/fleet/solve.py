@@ -18,6 +18,7 @@ from axisight.documents import parse_json, read_text
 from axisight.errors import AxisightError
 from axisight.fleet.cases import FleetCase, fingerprint, fleet_cases
 from axisight.gap import Settings, diagnose
+from axisight.gap.facts.schema import VERDICT_SCHEMA
 from axisight.storage import write_whole
 
 Progress = Callable[[str, int, int], None]
@@ -89,7 +90,7 @@ def verdict_of(name: str, files: dict[str, bytes], settings: Settings) -> str:
             found = diagnose(Path(folder), settings=settings)
         except AxisightError as error:
             reason = str(error).replace(f"{folder}/", "")
-            return json.dumps({"schema": "axisight.verdict/1", "name": name, "error": reason})
+            return json.dumps({"schema": VERDICT_SCHEMA, "name": name, "error": reason})
         out = found.to_verdict()
     # The run time is not part of the result.
     out["provenance"].pop("seconds", None)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from axisight.effects import effect_table
-from axisight.gap.facts.axis_names import axis_label
+from axisight.gap.facts.axis_names import axis_label, in_words
 from axisight.gap.facts.compared_quantity import MOTION_HEAD, motion_words, torque_of
 from axisight.gap.facts.result import (
     Candidate,
@@ -53,6 +53,10 @@ from axisight.storage import write_whole
 _VERDICTS: dict[VerdictKind, tuple[str, str]] = {
     "none": ("None", "The simulator has no gap above the floor."),
     "explained": ("Explained", "The causes below remove the gap on the validation logs."),
+    "explained_in_part": (
+        "Explained in part",
+        "The causes below are sure. Beside them a gap remains that no effect of the library explains.",
+    ),
     "unknown": ("Unknown", "A gap remains that no effect of the library explains."),
     "undecidable": ("Undecidable", "Two or more causes explain these logs equally well."),
 }
@@ -183,7 +187,7 @@ def _gap_rows(diagnosis: Diagnosis) -> list[list[str]]:
         for i, verdict, row in diagnosis.axis_rows()
     ]
     wholes: list[tuple[str, str, Gap | Pooled | None]] = [
-        ("all", diagnosis.verdict, gap),
+        ("all", in_words(diagnosis.verdict), gap),
         ("pooled", NO_VALUE, gap.pooled),
     ]
     for name, verdict, whole in wholes:

@@ -17,6 +17,7 @@ from axisight.cli import app
 from axisight.cli import diagnose as command
 from axisight.cli.demo import write_demo_case
 from axisight.cli.diagnose import EXIT_CODES
+from axisight.gap.facts.axis_names import in_words
 from columns_data import maker_columns, write_csv
 from diagnosis_data import VERDICTS, explained, of
 
@@ -141,7 +142,7 @@ def test_every_verdict_has_an_exit_code_that_no_error_has(repository):
     page = (repository / "docs" / "outputs.md").read_text("utf-8")
     for place in (page, " ".join(run("diagnose", "--help").output.split())):
         for verdict, code in EXIT_CODES.items():
-            assert f"{code} {verdict}" in place.replace(" │ │ ", " ")
+            assert f"{code} {in_words(verdict)}" in place.replace(" │ │ ", " ")
 
 
 def test_an_error_is_no_verdict(case):

@@ -83,24 +83,19 @@ def hides_all(floor: float) -> bool:
     return _CLEAR * floor >= 1.0
 
 
+def in_words(verdict: str) -> str:
+    """Return a verdict as it is told: *explained_in_part* without its underscores."""
+    return verdict.replace("_", " ")
+
+
 def verdict_word(verdict: str, row: Sequence[float]) -> str:
     """Return the verdict of an axis in words, beside its ``row`` of the gap: before, re-fitted, after, floor [1].
 
-    That of an axis that is *explained*, because causes act on it, can be:
-
-    | word | where |
-    |---|---|
-    | ``at the floor`` | the re-fitted simulator has no gap there that the causes could explain |
-    | ``above the floor`` | a clear gap is left there, and less than three quarters of it (in squares) are removed |
+    An axis that is *explained* because causes act on it, and has no gap that they could explain, is ``at the floor``.
     """
-    before, refitted, after, floor = row
-    if verdict != "explained":
-        return verdict
-    if at_floor(refitted, floor):
-        return "at the floor"
-    left, all_of_it = after**2 - floor**2, before**2 - floor**2
-    clear = after > _CLEAR * floor and left > _SEEN**2
-    return "above the floor" if clear and left > (1 - _REMOVED) * all_of_it else verdict
+    return (
+        "at the floor" if verdict == "explained" and at_floor(row[1], row[3]) else in_words(verdict)
+    )
 
 
 def removed_by_refit(

@@ -126,7 +126,7 @@ class Finding:
         return f"{self.name}: {where}: {self.message}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the finding as in ``axisight.verdict/1``."""
+        """Return the finding as in ``axisight.verdict/2``."""
         return {
             "name": self.name,
             "severity": self.severity,

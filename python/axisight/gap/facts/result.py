@@ -17,16 +17,17 @@ from axisight.display.summary import MOST, summarized
 from axisight.documents import finite
 from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.gap.facts.axis_names import axis_label, verdict_word
+from axisight.gap.facts.axis_names import axis_label, in_words, verdict_word
 from axisight.gap.facts.compared_quantity import MOTION_HEAD, Compared, VelocityFrom, motion_words
 from axisight.gap.facts.experiment import Experiment
 from axisight.gap.facts.faults import Finding
+from axisight.gap.facts.schema import VERDICT_SCHEMA
 from axisight.gap.facts.shown import cause_in_words, cause_rows, percent
 from axisight.gap.facts.trace import Trace
 from axisight.robot.axis_names import axis_number
 from axisight.storage import write_whole
 
-VerdictKind = Literal["none", "explained", "unknown", "undecidable"]
+VerdictKind = Literal["none", "explained", "explained_in_part", "unknown", "undecidable"]
 Mode = Literal["closed_loop", "inverse_dynamics"]
 Hidden = Literal["tolerances", "motion"]
 Array = NDArray[np.float64]
@@ -437,7 +438,7 @@ class Diagnosis:
             name = f"axis {axis_label(number, self.joints)}"
             rows.append((name, f"{verdict}: {percent(row[0])} to {percent(row[2])}".lstrip(": ")))
         rows += [("next", self.next_experiment)] if self.next_experiment else []
-        return f"Diagnosis {self.name!r}: {self.verdict}", rows
+        return f"Diagnosis {self.name!r}: {in_words(self.verdict)}", rows
 
     def _repr_html_(self) -> str:
         """Verdict, causes with values, and the gap by axis, for notebooks."""
@@ -472,12 +473,12 @@ class Diagnosis:
         )
 
     def to_verdict(self) -> dict[str, Any]:
-        """Return the verdict as ``axisight.verdict/1``; `axisight.gap.verdict_schema` describes it.
+        """Return the verdict as ``axisight.verdict/2``; `axisight.gap.verdict_schema` describes it.
 
         Numbers that are not finite, as the gap of a simulation that broke off, become None.
         """
         out = {
-            "schema": "axisight.verdict/1",
+            "schema": VERDICT_SCHEMA,
             "name": self.name,
             "mode": self.mode,
             "verdict": self.verdict,

@@ -33,6 +33,7 @@ RULES: Mapping[str, str] = MappingProxyType(
         "reported_torque": "The controller's gains, as the logs show them, imply this torque constant.",
         "beside_causes": "Other causes of the axis are no rivals, so their probability does not count.",
         "either": "Another cause gives the same logs and is equally likely.",
+        "verdict": "The verdict also counts the validation logs and the scatter of simulators.",
         "twins": "Other effects give exactly the same logs and take a share of its probability.",
     }
 )

@@ -24,8 +24,10 @@ from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.tolerance_edges import parameters_at_edge
 from axisight.gap.measure.chatter import chance_check
 from axisight.gap.measure.detection_limits import detection_limits
+from axisight.gap.measure.gap_beyond_torque import beyond_torque
 from axisight.gap.measure.gap_figures import gap_figures, stage
 from axisight.gap.measure.motion_errors import motion_errors, velocity_from
+from axisight.gap.measure.reach import Reach
 from axisight.gap.measure.where import (
     band_map,
     findings,
@@ -37,13 +39,13 @@ from axisight.gap.ranking.twins import open_twins
 from axisight.gap.search.account import trace_of
 from axisight.gap.signals.encoder_steps import encoder_steps
 from axisight.gap.simulator.own_parameters import nominal_and_size, nominal_values
-from axisight.gap.verdict.axis_verdicts import open_groups, with_axes_agreed
+from axisight.gap.verdict.agreed_probabilities import in_agreement
+from axisight.gap.verdict.axis_verdicts import open_groups, verdict_told, with_axes_agreed
 from axisight.gap.verdict.bent_simulator import bent_for
 from axisight.gap.verdict.carry_over import carried_over, open_check
 from axisight.gap.verdict.coarse_encoders import with_coarse_encoders
-from axisight.gap.verdict.conclusion import Conclusion
+from axisight.gap.verdict.conclusion import Conclusion, advice_unknown
 from axisight.gap.verdict.controller_causes import with_controllers_shown
-from axisight.gap.verdict.gap_beyond_torque import beyond_torque
 from axisight.gap.verdict.headline import Facts, headline
 from axisight.gap.verdict.remainder import refit_worse, remainder_of, reversals_smeared
 from axisight.gap.verdict.validated import Validated
@@ -80,7 +82,7 @@ def assembled(
     quiet = [a.axis for a in conclusion.axes if a.verdict == "none"]
     left = remainder_of(reach.judged, gap_figures(reach.judged), reach.left, settings, quiet)
     places = _places(conclusion, (bands, regimes, settings.significance), settings)
-    conclusion = conclusion.ranked_on(places[0].axis) if places else conclusion
+    conclusion = in_agreement(conclusion.ranked_on(places[0].axis) if places else conclusion)
     causes = _causes(conclusion, reductions)
     # Without causes, `after` is the re-fitted simulator.
     fitted = found.model if reach.reductions else found.baseline
@@ -88,7 +90,7 @@ def assembled(
     return Diagnosis(
         name=name,
         mode=view.mode,
-        verdict=conclusion.verdict,
+        verdict=verdict_told(conclusion),
         headline=headline(
             Facts(
                 verdict=conclusion.verdict,
@@ -104,6 +106,7 @@ def assembled(
                 refit=refit,
                 joints=robot.axis_names,
                 mode=view.mode,
+                apart=_apart(reach),
             )
         ),
         gap=gap,
@@ -111,7 +114,7 @@ def assembled(
         causes=causes,
         alternatives=conclusion.alternatives,
         equivalent=conclusion.equivalent,
-        next_experiment=conclusion.next_experiment,
+        next_experiment=_next_experiment(conclusion),
         ranking=conclusion.ranking,
         band_map=bands,
         regime_maps=regimes,
@@ -138,11 +141,21 @@ def assembled(
         settings=settings.as_dict(robot),
         trace=replace(
             trace_of(found),
-            named=tuple(x for c in conclusion.causes for x in c.ledger),
+            named=(*(x for c in conclusion.causes for x in c.ledger), *conclusion.ledger),
             work=view.fitter.work.done,
         ),
         provenance=_provenance(robot, view, names, settings),
     )
+
+
+def _apart(reach: Reach) -> float | None:
+    """Return the difference of two runs of a machine that chatters [1]; None of others."""
+    return None if reach.judged is reach.stages else float(np.sqrt(reach.judged.floor.mean()))
+
+
+def _next_experiment(conclusion: Conclusion) -> str | None:
+    in_part = verdict_told(conclusion) == "explained_in_part"
+    return conclusion.next_experiment or (advice_unknown() if in_part else None)
 
 
 def _limits(limits: Sequence[DetectionLimit], conclusion: Conclusion) -> tuple[DetectionLimit, ...]:

@@ -7,11 +7,14 @@ it. The validation logs say what the table shows. One rule makes the label of an
 |---|---|
 | *none* | *none* |
 | *explained* | *explained* where a cause acts or the axis has a gap; else *none* |
+| *explained in part* | as *explained*, or as *unknown* |
 | *undecidable* | as above, and *undecidable* where a cause acts that stays open |
 | *unknown* | *explained* where a cause removes the gap, *unknown* where a gap is left, else *none* |
 
-So no axis of an *explained* arm is *unknown*: `verdict_word` and the remainder say where a gap is left. At least
-one axis has the verdict of the arm. An axis that is *none* has no cause, and no place where the gap lies.
+So no axis of an *explained* arm is *unknown*. An axis that would be *explained* is *explained in part* where the gap
+with the causes is at least twice the floor, with the error of formulas added in squares. The arm is *explained in
+part* where an axis of an *explained* arm is, and where an *unknown* arm keeps causes. At least one axis has the verdict
+of the arm, or of its part. An axis that is *none* has no cause, and no place where the gap lies.
 
 An axis has a gap where one of these holds:
 
@@ -38,7 +41,7 @@ from axisight.gap.facts.result import AxisVerdict, Gap, VerdictKind
 from axisight.gap.facts.settings import Settings
 from axisight.gap.measure.gap_figures import Stages
 from axisight.gap.ranking.twins import open_twins
-from axisight.gap.verdict.carry_over import above_floor
+from axisight.gap.verdict.carry_over import above_floor, far_above_floor
 from axisight.gap.verdict.conclusion import OF_COLOUR, Conclusion
 
 
@@ -47,7 +50,8 @@ class AxisEvidence:
     """What is known of one axis, all relative to the torque or its noise [1].
 
     ``excess`` and ``explained`` as in `AxisVerdict`; ``refitted``, ``after`` and ``floor`` as in `Gap`;
-    ``above``: whether a validation log stands above what passes for the floor.
+    ``above``: whether a validation log stands above what passes for the floor; ``left``: whether the causes leave
+    a gap of at least twice the floor.
     """
 
     excess: float
@@ -56,6 +60,7 @@ class AxisEvidence:
     after: float
     floor: float
     above: bool = False
+    left: bool = False
 
     @property
     def quiet(self) -> bool:
@@ -99,11 +104,15 @@ def axis_verdicts(
         _label(arm, e, gap, mine, causes, settings)
         for e, gap, mine in zip(evidence, gaps, acting, strict=True)
     ]
-    if arm != "none" and arm not in labels:
+    if (
+        arm != "none"
+        and arm not in labels
+        and not (arm == "explained" and "explained_in_part" in labels)
+    ):
         # A cause of the whole arm that leaves no axis above the floor acts on all of them alike.
         whole = tuple(k for k, c in enumerate(causes) if not c.axes)
         for i in _stand_for_the_arm(arm, evidence, labels, acting, whole):
-            labels[i] = arm
+            labels[i] = "explained_in_part" if arm == "explained" and evidence[i].left else arm
             acting[i] = acting[i] if arm == "unknown" else tuple(sorted({*acting[i], *whole}))
     return tuple(
         AxisVerdict(i, label, e.excess, e.explained, mine)
@@ -125,7 +134,7 @@ def _label(
         return "undecidable"
     if arm == "unknown" and gap and not _removed(evidence, acting, causes, settings):
         return "unknown"
-    return "explained"
+    return "explained_in_part" if evidence.left else "explained"
 
 
 def _removed(
@@ -170,18 +179,17 @@ def with_axes_agreed(
     ``stages``: as they are judged; ``gap``: as it is told.
     """
     above = np.any(above_floor(stages.refitted, stages) > 0, axis=0)
+    left = far_above_floor(stages, settings.model_error)
     figures = zip(
         conclusion.axes,
         gap.refitted_per_axis.tolist(),
         gap.after_per_axis.tolist(),
         gap.floor_per_axis.tolist(),
         above.tolist(),
+        left.tolist(),
         strict=True,
     )
-    evidence = [
-        AxisEvidence(a.excess, a.explained, refitted, after, floor, over)
-        for a, refitted, after, floor, over in figures
-    ]
+    evidence = [AxisEvidence(a.excess, a.explained, *row) for a, *row in figures]
     still_open = {x for group in open_groups(conclusion, len(evidence)) for x in group}
     causes = [
         Acting(c.axes or (() if c.axis is None else (c.axis,)), c.label in still_open)
@@ -189,6 +197,16 @@ def with_axes_agreed(
     ]
     axes = axis_verdicts(conclusion.verdict, evidence, causes, settings, own_residual=own_residual)
     return replace(conclusion, axes=axes)
+
+
+def verdict_told(conclusion: Conclusion) -> VerdictKind:
+    """Return the verdict of the arm as it is told: *explained in part* where its causes leave a gap unexplained."""
+    parts = any(a.verdict == "explained_in_part" for a in conclusion.axes)
+    if conclusion.verdict == "explained" and parts:
+        return "explained_in_part"
+    if conclusion.verdict == "unknown" and conclusion.causes:
+        return "explained_in_part"
+    return conclusion.verdict
 
 
 def open_groups(conclusion: Conclusion, n_axes: int) -> tuple[tuple[str, ...], ...]:

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 # leaves less, with its formula errors.
 _FACTOR = 1.3
 _SEEN = 0.03
+# Gap with the causes, relative to the floor, from which the rest counts as unknown.
+_FAR = 2.0
 # Share of the explainable squared gap on validation logs that causes must remove: less than half of the amplitude is
 # left then. One of two equal causes removes less.
 _ENOUGH = 0.8
@@ -139,6 +141,16 @@ def above_floor(left: Stage, stages: Stages) -> Array:
     """
     passing = _FACTOR**2 * _squares(stages.floor) + _SEEN**2
     return _squares(left) - passing - (0.0 if stages.open is None else _squares(stages.open))
+
+
+def far_above_floor(stages: Stages, model_error: float) -> NDArray[np.bool_]:
+    """Return a mask (n_axes,) of the axes where the causes leave at least twice the floor.
+
+    The floor has the error of formulas [1] added in squares, and what no data can explain.
+    """
+    least = _squares(stages.floor) + model_error**2
+    passing = _FAR**2 * least + (0.0 if stages.open is None else _squares(stages.open))
+    return np.asarray(_squares(stages.after).mean(axis=0) >= np.mean(passing, axis=0))
 
 
 def open_check(stages: Stages) -> tuple[str, ...]:

@@ -63,6 +63,8 @@ class Conclusion:
     """How the validation logs contradict what the estimation logs say, if they do."""
     standings: tuple[AxisStanding, ...] = ()
     """How candidates stood on each axis in the first round of the search."""
+    ledger: tuple[Adjustment, ...] = ()
+    """What the verdict itself changed of the probabilities."""
 
     def with_checks(self, more: Sequence[str]) -> Conclusion:
         """Return the same with further checks."""

@@ -62,7 +62,8 @@ class Facts:
     ``open``: groups of labels that the data cannot tell apart, the cause first; ``twins``: groups that give
     the same logs; ``withdrawn``: how the validation logs contradict the estimation logs. ``where`` the gap
     lies and the ``remainder`` with the causes in. ``own``: effects of the simulator; ``refit``: relative change
-    of its own parameters [1]; ``joints``: names of its axes. ``mode``: how torques were predicted.
+    of its own parameters [1]; ``joints``: names of its axes. ``mode``: how torques were predicted. ``apart``: by how
+    much two runs of a machine that chatters differ [1].
     """
 
     verdict: VerdictKind
@@ -78,6 +79,7 @@ class Facts:
     refit: Mapping[str, Interval] = field(default_factory=dict)
     joints: Sequence[str] = ()
     mode: Mode = "closed_loop"
+    apart: float | None = None
 
     @property
     def n_axes(self) -> int:
@@ -166,7 +168,14 @@ def _none(facts: Facts) -> list[str]:
 
 def _explained(facts: Facts) -> list[str]:
     """Of causes: those that are sure, those that stay open, what they do to the gap, what is left."""
-    return [_sure(facts), _open(facts), _effect(facts), _twins(facts), _rest(facts)]
+    return [_sure(facts), _open(facts), _effect(facts), _chance(facts), _twins(facts), _rest(facts)]
+
+
+def _chance(facts: Facts) -> str:
+    """Return that a machine with its causes chatters."""
+    if facts.apart is None:
+        return ""
+    return f"The motion is then chaotic: two runs differ by {percent(facts.apart)}, whatever the simulator."
 
 
 def _sure(facts: Facts) -> str:
@@ -294,12 +303,22 @@ def _twins(facts: Facts) -> str:
 
 
 def _rest(facts: Facts) -> str:
+    """Return what is left: of axes that are *explained in part*, else where the remainder is largest."""
     left = facts.remainder
-    if left is None or not left.where:
+    parts = [a.axis for a in facts.axes if a.verdict == "explained_in_part"]
+    if left is None or not (left.where or parts):
         return ""
-    axis = left.where[0].axis
+    places = [w for w in left.where if w.axis in parts or not parts]
+    axis = places[0].axis if places else parts[0]
     value = percent(float(left.per_axis[axis - 1]))
-    return f"Axis {axis} keeps {value} of its {_torque(facts)} above noise{_regime(left.where[0])}."
+    regime = _regime(places[0]) if places else ""
+    keeps = f"Axis {axis} keeps {value} of its {_torque(facts)} above noise{regime}"
+    if not parts:
+        return f"{keeps}."
+    rest = [x for x in parts if x != axis]
+    return " ".join(
+        filter(None, (f"{keeps}; no known effect explains that.", _too(rest, "such a rest")))
+    )
 
 
 def _unknown(facts: Facts) -> list[str]:

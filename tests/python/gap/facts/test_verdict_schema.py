@@ -185,7 +185,7 @@ def test_unknown_and_missing_keys_fail_everywhere():
         ("undecidable", {"next_experiment": None}),
         ("unknown", {"p_none": 1.2}),
         ("unknown", {"mode": "open_loop"}),
-        ("unknown", {"schema": "axisight.verdict/2"}),
+        ("unknown", {"schema": "axisight.verdict/1"}),
     ],
 )
 def test_what_contradicts_itself_fails(verdict, change):

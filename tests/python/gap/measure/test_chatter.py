@@ -1,5 +1,6 @@
 """A machine that chatters leaves to chance what no simulator can follow."""
 
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -28,12 +29,23 @@ def reached(after: float) -> Stages:
 
 
 def judged(
-    after: float, *, runs: float = 0.06, followed: float = 0.99, causes: Variant = PLAY
+    after: float,
+    *,
+    runs: float = 0.06,
+    followed: float = 0.99,
+    causes: Variant = PLAY,
+    torque: Callable[[Variant], float] = lambda _: 0.0,
 ) -> tuple[Stages, Stages]:
-    view = SimpleNamespace(logs=[], noises=lambda *_: [runs], followed=lambda *_: followed)
+    view = SimpleNamespace(
+        logs=[],
+        settings=Settings(),
+        noises=lambda *_: [runs],
+        followed=lambda *_: followed,
+        torques=lambda variant, _: [torque(variant)],
+    )
     stages = reached(after)
     found = SimpleNamespace()
-    return stages, with_chance(view, found, [], stages, causes, lambda x: of(x[0]))
+    return stages, with_chance(view, found, [], stages, causes, lambda x: of(abs(x[0])))
 
 
 def test_the_floor_is_what_two_runs_of_the_machine_differ_by():
@@ -42,6 +54,28 @@ def test_the_floor_is_what_two_runs_of_the_machine_differ_by():
     assert (seen.given, seen.after) == (stages.given, stages.after)
     (said,) = chance_check(stages, seen)
     assert "24.5 % of the torque" in said
+
+
+def two_courses(variant: Variant) -> float:
+    """Take another course where the play is wider than stated: 0.05 of squared torque away."""
+    (effect,) = variant.effects
+    return 0.05 if effect.parameters["half_width_rad"] > 1e-4 else 0.0
+
+
+def test_a_thousandth_of_a_number_makes_another_run():
+    """Draws on either side of a bifurcation: noise alone shows nothing."""
+    stages, seen = judged(0.055, runs=0.01, torque=two_courses)
+    assert seen.floor.mean() == pytest.approx(0.01 + 0.05)
+    again = judged(0.055, runs=0.01, torque=two_courses)[1]
+    assert np.array_equal(again.floor.blocks, seen.floor.blocks)
+    # A torque in proportion to the number is no chaos.
+    stages, seen = judged(
+        0.055, runs=0.01, torque=lambda v: 1e-4 * v.effects[0].parameters["half_width_rad"] / 1e-4
+    )
+    assert seen is stages
+    # Nor is another course an excuse for causes that do not explain the logs it is kept on.
+    stages, seen = judged(0.055, runs=0.01, torque=two_courses, followed=0.9)
+    assert seen is stages
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from axisight.cli.show import _percent
 from axisight.gap.facts.result import Remainder, Where
 from axisight.gap.facts.wording import percent
-from axisight.gap.verdict.gap_beyond_torque import beyond_torque
+from axisight.gap.measure.gap_beyond_torque import beyond_torque
 from axisight.gap.verdict.remainder import reversals_smeared
 from axisight.report import wording
 from diagnosis_data import gap
