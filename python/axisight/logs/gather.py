@@ -277,14 +277,14 @@ def _take_signal(files: _Files, result: Gathered, channel: Channel, signal: Any)
     try:
         arrays = files.of(signal)
         values = _vector(arrays, signal, files.budget)
-        unscaled = signal.scale is None or (signal.unit == "A" and signal.is_unknown)
-        scale = 1.0 if unscaled else _scalar(arrays, signal.scale)
+        scale, offset = (_scalar(arrays, value) for value in signal.line)
     except LogError as error:
         result.findings.append(Finding("error", signal.label, str(error)))
         return
     factor = signal.sign * scale * si_factor(signal.unit, signal.counts_per_rev)
     # In place: the log may have used all of its budget already.
     with np.errstate(over="ignore", invalid="ignore"):  # check_finite reports values that overflow
+        values -= offset
         values *= factor
         values += si_offset(signal.unit)
     result.signals[channel] = values

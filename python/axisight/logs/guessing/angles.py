@@ -133,7 +133,7 @@ def _unit(draft: Draft, family: Family) -> tuple[str, str]:
     if named is not None:
         raise draft.refusal(
             f"position: expected a unit of angles or lengths, got {named} in {family.label}; write a map "
-            f"with counts_per_rev"
+            f"with counts_per_rev, and with offset if the encoder does not read 0 at zero"
         )
     for velocity in of_quantity(draft.families, "velocity"):
         signals = velocity.of(draft.axes)
