@@ -490,8 +490,8 @@ def test_the_stamps_of_the_bench_are_in_us(shared_data, tmp_path):
         ("time,position_1,torque_1\n[s],[deg],[Nm]\n", "position_1 (no numbers: row 1 is '[deg]')"),
         ('time,q,tau\n0.0,"[0.0, 1.0]","[2.0, 3.0]"\n', "q (no numbers: row 1 is '[0.0, 1.0]')"),
         (
-            "stamp,q,tau\n2024-05-01 12:00:00.000,0.0,1.0\n",
-            "stamp (no numbers: row 1 is '2024-05-01",
+            "stamp,q,tau\n1.5.2024 12:00:00.000,0.0,1.0\n",
+            "stamp (no numbers: row 1 is '1.5.2024",
         ),
     ],
 )
