@@ -139,10 +139,13 @@ def _leave_empty_torques(result: Gathered) -> tuple[str, ...]:
     """
     axes = range(len(result.columns.axis))
     torques = [result.signals.get(("torque", axis)) for axis in axes]
-    targets = all(("position_ref", axis) in result.signals for axis in axes)
-    targets = targets and not any(field == "velocity_ref" for field, _ in result.signals)
-    filled = any(x is None or x.size == 0 or np.nan_to_num(x).any() for x in torques)
-    if not targets or filled:
+    if any(("position_ref", axis) not in result.signals for axis in axes) or any(
+        x is None or x.size == 0 or np.nan_to_num(x).any() for x in torques
+    ):
+        return ()
+    # Zeros beside references of speed may be a dead channel of a log that has torques; NaN is no channel.
+    speeds = any(field == "velocity_ref" for field, _ in result.signals)
+    if speeds and not all(x is not None and np.isnan(x).all() for x in torques):
         return ()
     for axis in axes:
         del result.signals["torque", axis]
