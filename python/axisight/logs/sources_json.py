@@ -56,7 +56,11 @@ def load_json_lines(path: Path, budget: Budget) -> dict[str, Reader]:
 
 
 def _declared(path: Path, budget: Budget) -> bytes:
-    """Return the bytes of a file after its values are counted: k members of an object or list have k - 1 commas."""
+    """Return the bytes of a file, after they and its values are counted against the budget.
+
+    An object or list of k members has k - 1 commas.
+    """
+    budget.take(path.stat().st_size)
     data = path.read_bytes()
     budget.take_values((sum(map(data.count, (b",", b"[", b"{"))) + 1,), 8)
     return data

@@ -279,7 +279,9 @@ def test_columns_that_nobody_maps_are_not_read(tmp_path):
 )
 def test_the_limit_is_the_callers_to_set(tmp_path, suffix):
     path = write(tmp_path / f"a{suffix}", native_columns(n=1000, n_axes=1))
-    assert read_log(path, max_bytes=130_000).n_samples == 1000
+    # The text of JSON is in memory beside its values.
+    text = path.stat().st_size if suffix.startswith(".json") else 0
+    assert read_log(path, max_bytes=130_000 + text).n_samples == 1000
     with pytest.raises(LogError, match=r"expected at most 0\.02 MB .*max_bytes.*raises the limit"):
         read_log(path, max_bytes=20_000)
     assert not check_log(path, max_bytes=20_000).ok
