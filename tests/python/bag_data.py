@@ -71,11 +71,19 @@ _POINTS = {"new": ("reference", "feedback"), "old": ("desired", "actual")}
 
 
 def controller_states(
-    names: Sequence[str], time_s: Array, told: Array, done: Array, age: str
+    names: Sequence[str],
+    time_s: Array,
+    told: Array,
+    done: Array,
+    age: str,
+    *,
+    speeds: Array | None = None,
+    effort: float | None = None,
 ) -> Callable[[Any, Any], None]:
     """Return a function that writes a trajectory controller's targets and positions (n, n_joints).
 
-    ``age``: ``new`` or ``old`` names of the message's points.
+    ``age``: ``new`` or ``old`` names of the message's points. ``speeds`` (n, n_joints) are those of all points,
+    and ``effort`` is that of all joints and times; without them the messages have none.
     """
     points = _POINTS[age]
     fields = [f"trajectory_msgs/JointTrajectoryPoint {point}" for point in (*points, "error")]
@@ -91,8 +99,10 @@ def controller_states(
             when = known["builtin_interfaces/msg/Time"](*divmod(stamp, 1_000_000_000))
             still = known["builtin_interfaces/msg/Duration"](0, 0)
             none = np.zeros(0)
+            speed = none if speeds is None else speeds[k]
+            force = none if effort is None else np.full(len(names), effort)
             rows = [
-                known["trajectory_msgs/msg/JointTrajectoryPoint"](row, none, none, none, still)
+                known["trajectory_msgs/msg/JointTrajectoryPoint"](row, speed, none, force, still)
                 for row in (told[k], done[k], told[k] - done[k])
             ]
             message = known[CONTROLLER_STATE](

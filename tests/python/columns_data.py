@@ -105,6 +105,14 @@ MAKERS = {
             "torque": ("observation.effort[{}]", 0, 1.0),
         },
     ),
+    "lerobot-degrees": (
+        ("timestamp", 1.0),
+        {
+            "position": ("observation.state[{}]", 0, DEG),
+            "velocity": ("observation.velocity[{}]", 0, DEG),
+            "torque": ("observation.effort[{}]", 0, 1.0),
+        },
+    ),
 }
 
 
@@ -124,10 +132,20 @@ def write_csv(path: Path, columns: dict[str, np.ndarray], separator: str = ",") 
 
 
 def write_lerobot(
-    folder: Path, episodes: int = 1, n_axes: int = 6, *, version: int = 2, effort: bool = True
+    folder: Path,
+    episodes: int = 1,
+    n_axes: int = 6,
+    *,
+    version: int = 2,
+    effort: bool = True,
+    scale: float | np.ndarray = 1.0,
 ) -> Path:
-    """Write a dataset in LeRobot's format; episode k is shifted by k rad; lists are float32."""
+    """Write a dataset in LeRobot's format; lists are float32.
+
+    Positions are in rad times ``scale`` (one number, or one per axis); those of episode k are shifted by k.
+    """
     run = motion(n_axes, 600)
+    run["position"] = run["position"] * scale
     frames = []
     for k in range(episodes):
         frame = {

@@ -38,8 +38,9 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
 def batch(folder, path, rng, times=TIMES):
     """Write ``times`` damaged files with the suffix of the original."""
     data, paths = path.read_bytes(), []
+    suffix = "".join(path.suffixes[-2:]) if path.suffix == ".gz" else path.suffix
     for number in range(times):
-        paths.append(folder / f"{number}{path.suffix}")
+        paths.append(folder / f"{number}{suffix}")
         paths[-1].write_bytes(mutated(data, rng))
     return paths
 

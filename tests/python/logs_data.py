@@ -1,5 +1,6 @@
 """Small invented logs and writers of every format, for the log tests."""
 
+import json
 from pathlib import Path
 
 import h5py
@@ -39,8 +40,15 @@ def write(path: Path, columns: dict, kind: str | None = None) -> Path:
         write_mat73(path, columns)
     elif kind == ".parquet":
         pd.DataFrame(columns).to_parquet(path)
-    elif kind == ".csv":
+    elif kind in {".csv", ".gz"}:
         pd.DataFrame(columns).to_csv(path, index=False)
+    elif kind == ".tsv":
+        pd.DataFrame(columns).to_csv(path, index=False, sep="\t")
+    elif kind in {".json", ".jsonl"}:
+        rows = [json.dumps(row) for row in pd.DataFrame(columns).to_dict(orient="records")]
+        path.write_text("\n".join(rows) if kind == ".jsonl" else f"[{','.join(rows)}]")
+    elif kind == ".npy":
+        np.save(path, pd.DataFrame(columns).to_records(index=False))
     elif kind == ".mat":
         scipy.io.savemat(path, columns)
     elif kind in {".h5", ".hdf5"}:
@@ -60,5 +68,11 @@ FORMATS = [
     ("run.h5", None),
     ("run.hdf5", None),
     ("run.npz", None),
+    ("run.csv.gz", None),
+    ("run.tsv", None),
+    ("run.json", None),
+    ("run.jsonl", None),
+    ("run.npy", None),
 ]
 FORMAT_IDS = ["parquet", "csv", "mat5", "mat73", "h5", "hdf5", "npz"]
+FORMAT_IDS += ["csv.gz", "tsv", "json", "jsonl", "npy"]

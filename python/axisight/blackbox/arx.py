@@ -127,12 +127,12 @@ class ARXModel:
         """Return G(e^{iwT}) = A^-1 B and its variance, in the format of `axisight.frf.frequency_response`.
 
         ``frequency_hz`` [Hz] ascends, up to Nyquist; ``input_unit`` and ``output_unit`` are
-        labels. The variance follows from the covariance of the parameters to first order. Raises
-        InputError for other frequencies.
+        labels. The variance follows from the covariance of the parameters to first order. A line on a
+        pole, to rounding, is NaN and flagged. Raises InputError for other frequencies.
         """
         f = lines(frequency_hz, self.sample_time_s)
         z = np.exp(2j * np.pi * f * self.sample_time_s)
-        inverse = np.asarray(np.linalg.inv(_polynomial(self.a, z)), np.complex128)
+        inverse = _inverse_polynomial(self.a, z)
         g = np.asarray(inverse @ _polynomial(self.b, z), np.complex128)
         return frequency_response(
             f,
@@ -362,6 +362,17 @@ def _inverse(regressor: Real, n_rows: int, output: int) -> tuple[Real, float]:
             "na and nb, sample more slowly, or excite more"
         )
     return np.asarray((vt.T / s) @ u.T / size[:, None]), float(s[0] / s[-1])
+
+
+def _inverse_polynomial(coefficients: Real, z: Complex) -> Complex:
+    """Return A(z)^-1 (n, p, p) for ``coefficients`` (lags, p, p) at each z (n,); NaN on a pole."""
+    matrix = _polynomial(coefficients, z)
+    # On the unit circle no term is larger than its coefficients, and each rounds by eps.
+    rounding = np.finfo(float).eps * len(coefficients) * float(np.abs(coefficients).sum())
+    off = np.linalg.svd(matrix, compute_uv=False)[:, -1] > rounding
+    out = np.full(matrix.shape, np.nan, np.complex128)
+    out[off] = np.linalg.inv(matrix[off])
+    return out
 
 
 def _polynomial(coefficients: Real, z: Complex) -> Complex:

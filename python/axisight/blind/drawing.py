@@ -46,7 +46,7 @@ _MOTIONS = {"multisines": 0.6, "moves": 0.2, "slow_and_short": 0.2}
 _COLOURED_ONE_IN = 5
 _CORNER_HZ = (300.0, 800.0)
 # One case of so many has logs without references, unless only references show its effect or the logged torque
-# contains it. One has quantized torques: converter bits over twice the largest torque.
+# contains it. One has quantized torques: 12 to 15 converter bits over twice the largest torque.
 _UNREFERENCED_ONE_IN = 8
 _STEPPED_ONE_IN = 8
 _BITS = (12, 16)

@@ -43,7 +43,7 @@ def guess_command(
     log: Annotated[
         Path,
         typer.Argument(
-            help="Log in any format that is read: CSV, Parquet, MAT, HDF5, NPZ, ROS bag, MCAP."
+            help="Log in any format that is read: CSV, TSV, JSON, Parquet, MAT, HDF5, NPY, NPZ, ROS bag, MCAP."
         ),
     ],
     out: Annotated[

@@ -21,7 +21,7 @@ REASON = {
 
 
 def explain_flags(dataset: xr.Dataset, records: PeriodicRecords | None = None) -> list[str]:
-    """Return one sentence for each run of flagged lines, with the reason.
+    """Return one sentence for each run of flagged lines, with the reason, and for each dead output.
 
     dataset
         The Dataset of an estimator.
@@ -29,7 +29,8 @@ def explain_flags(dataset: xr.Dataset, records: PeriodicRecords | None = None) -
         The records of the estimate. With them the sentences name the inputs without amplitude, or the
         combination of inputs that no experiment excites (each input scaled to its own amplitude).
 
-    Returns an empty list if every line is good. Raises InputError if ``dataset`` has no flags or
+    A dead output does not change: its response is zero, though the lines are good. Returns an empty list if
+    every line is good and no output is dead. Raises InputError if ``dataset`` has no flags or
     ``records`` has other lines.
     """
     estimate_of("dataset", dataset)
@@ -46,10 +47,32 @@ def explain_flags(dataset: xr.Dataset, records: PeriodicRecords | None = None) -
         u = u.mean(axis=3)
     edges = np.flatnonzero(np.diff(flag)) + 1
     runs = np.split(np.arange(len(flag)), edges)
-    return [
+    flagged = [
         _sentence(run, Flag(flag[run[0]]), frequency, u)
         for run in runs
         if len(run) and flag[run[0]] != Flag.GOOD
+    ]
+    return flagged + (_still(dataset) if records is None else _constant(records))
+
+
+def _constant(records: PeriodicRecords) -> list[str]:
+    """Return a sentence for each recorded output that does not change in any experiment."""
+    flat = records.output.reshape(-1, records.n_outputs)
+    return [
+        f"output {o + 1}: expected it to change, got {flat[0, o]:g} throughout: the channel is dead, its "
+        f"response says nothing about the robot"
+        for o in np.flatnonzero(np.ptp(flat, axis=0) == 0.0)
+    ]
+
+
+def _still(dataset: xr.Dataset) -> list[str]:
+    """Return a sentence for each output whose response is zero wherever there is one."""
+    response = dataset["response"].values
+    known = np.isfinite(response).all(axis=(1, 2))
+    zero = (response[known] == 0).all(axis=(0, 2)) & bool(known.any())
+    return [
+        f"output {o + 1}: expected a response, got zero at every line: the channel is dead"
+        for o in np.flatnonzero(zero)
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Literal
 
@@ -20,6 +21,7 @@ from axisight.logs.units import (
 )
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
 Text = Annotated[str, Field(min_length=1)]
 
 
@@ -86,15 +88,64 @@ class _Signal(Address):
             raise ValueError("scale: expected a number other than 0, got 0")
         return self
 
+    @property
+    def line(self) -> tuple[float | str, float | str]:
+        """Return (scale, offset) of scale * (value - offset); a text names a scalar in the file."""
+        return 1.0 if self.scale is None else self.scale, 0.0
+
+
+Pair = tuple[Finite, Finite]
+
 
 class PositionColumn(_Signal):
-    """Position: SI value = sign * scale * value * unit factor. `scale` may name a scalar in the file."""
+    """Position: SI value = sign * scale * (value - offset) * unit factor.
+
+    `offset` is what the column reads at position zero, in the unit of the column, before scale and sign.
+    `scale` and `offset` may name scalars in the file. Instead of scale, sign and offset, two readings
+    (`raw_range`) and their positions (`unit_range`, in `unit`) may be given; a straight line joins them.
+    """
 
     unit: PositionUnit
+    offset: float | Text = 0.0
+    raw_range: Pair | None = None
+    unit_range: Pair | None = None
+
+    @model_validator(mode="after")
+    def _line(self) -> PositionColumn:
+        if isinstance(self.offset, float) and not math.isfinite(self.offset):
+            raise ValueError(f"offset: expected a finite number, got {self.offset}")
+        ranges = {"raw_range": self.raw_range, "unit_range": self.unit_range}
+        given = {name: ends for name, ends in ranges.items() if ends is not None}
+        if len(given) == 1:
+            (there,) = given
+            (missing,) = ranges.keys() - given
+            raise ValueError(f"expected {missing} beside {there}, got none")
+        for name, (low, high) in given.items():
+            if low == high:
+                raise ValueError(
+                    f"{name}: expected two numbers that differ, got [{low:g}, {high:g}]"
+                )
+        usual = {"scale": None, "sign": 1, "offset": 0.0}
+        beside = [key for key, value in usual.items() if getattr(self, key) != value]
+        if given and beside:
+            listed = ", ".join(beside)
+            raise ValueError(
+                f"expected raw_range and unit_range to give scale, sign and offset, got {listed} beside them"
+            )
+        return self
+
+    @property
+    def line(self) -> tuple[float | str, float | str]:
+        """Return (scale, offset) of scale * (value - offset); a text names a scalar in the file."""
+        if self.raw_range is None or self.unit_range is None:
+            return super().line[0], self.offset
+        (raw, other_raw), (value, other) = self.raw_range, self.unit_range
+        scale = (other - value) / (other_raw - raw)
+        return scale, raw - value / scale
 
 
 class VelocityColumn(_Signal):
-    """Velocity, measured or reference; scaled as `PositionColumn`."""
+    """Velocity, measured or reference: SI value = sign * scale * value * unit factor."""
 
     unit: VelocityUnit
 
@@ -113,6 +164,11 @@ class TorqueColumn(_Signal):
         if self.unit == "V" and self.scale is None:
             raise ValueError("unit 'V': expected scale (Nm or N per V) beside it, got none")
         return self
+
+    @property
+    def line(self) -> tuple[float | str, float | str]:
+        """Return (scale, 0) as for other signals; the scale of a current with an unknown constant is 1."""
+        return (1.0, 0.0) if self.is_unknown else super().line
 
     @property
     def is_current(self) -> bool:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from axisight.arguments import did_you_mean, short, shown, usable_path
 from axisight.errors import LogError
 from axisight.logs.budget import Budget
-from axisight.logs.columns import UNKNOWN, Address, AxisColumns, ColumnMap
+from axisight.logs.columns import UNKNOWN, Address, AxisColumns, ColumnMap, TimeColumn
 from axisight.logs.findings import Finding
 from axisight.logs.joint_states import joint_state_map
 from axisight.logs.lazy import LazyArrays
@@ -25,6 +25,7 @@ from axisight.logs.patterns import ColumnPattern
 from axisight.logs.sources import load_arrays
 from axisight.logs.sources_bag import is_bag
 from axisight.logs.sources_lerobot import is_lerobot
+from axisight.logs.stamps import EXAMPLE, are_dates, seconds_from_first
 from axisight.logs.units import si_factor, si_offset
 
 if TYPE_CHECKING:
@@ -138,10 +139,13 @@ def _leave_empty_torques(result: Gathered) -> tuple[str, ...]:
     """
     axes = range(len(result.columns.axis))
     torques = [result.signals.get(("torque", axis)) for axis in axes]
-    targets = all(("position_ref", axis) in result.signals for axis in axes)
-    targets = targets and not any(field == "velocity_ref" for field, _ in result.signals)
-    filled = any(x is None or x.size == 0 or np.nan_to_num(x).any() for x in torques)
-    if not targets or filled:
+    if any(("position_ref", axis) not in result.signals for axis in axes) or any(
+        x is None or x.size == 0 or np.nan_to_num(x).any() for x in torques
+    ):
+        return ()
+    # Zeros beside references of speed may be a dead channel of a log that has torques; NaN is no channel.
+    speeds = any(field == "velocity_ref" for field, _ in result.signals)
+    if speeds and not all(x is not None and np.isnan(x).all() for x in torques):
         return ()
     for axis in axes:
         del result.signals["torque", axis]
@@ -247,7 +251,9 @@ def _take_time(files: _Files, result: Gathered) -> None:
     columns = result.columns
     try:
         if columns.time is not None:
-            values = _vector(files.of(columns.time), columns.time, files.budget)
+            values = _stamps(
+                _vector(files.of(columns.time), columns.time, files.budget), columns.time
+            )
             files.budget.take(_TIME_COST * values.nbytes)
             with np.errstate(over="ignore"):
                 result.time_s = values * si_factor(columns.time.unit)
@@ -276,22 +282,22 @@ def _take_signal(files: _Files, result: Gathered, channel: Channel, signal: Any)
     result.labels[channel] = signal.label
     try:
         arrays = files.of(signal)
-        values = _vector(arrays, signal, files.budget)
-        unscaled = signal.scale is None or (signal.unit == "A" and signal.is_unknown)
-        scale = 1.0 if unscaled else _scalar(arrays, signal.scale)
+        values = _numbers(_vector(arrays, signal, files.budget))
+        scale, offset = (_scalar(arrays, value) for value in signal.line)
     except LogError as error:
         result.findings.append(Finding("error", signal.label, str(error)))
         return
     factor = signal.sign * scale * si_factor(signal.unit, signal.counts_per_rev)
     # In place: the log may have used all of its budget already.
     with np.errstate(over="ignore", invalid="ignore"):  # check_finite reports values that overflow
+        values -= offset
         values *= factor
         values += si_offset(signal.unit)
     result.signals[channel] = values
 
 
-def _vector(arrays: Mapping[str, NDArray[Any]], address: Address, budget: Budget) -> Floats:
-    """Return the addressed values as 1-D float64; raise LogError if they are missing or not numbers."""
+def _vector(arrays: Mapping[str, NDArray[Any]], address: Address, budget: Budget) -> NDArray[Any]:
+    """Return the addressed values (n,), counted as float64; raise LogError if they are missing."""
     if address.name not in arrays:
         listed = ", ".join(map(short, list(arrays)[:12])) or "nothing"
         meant = did_you_mean(address.name, arrays)
@@ -315,10 +321,20 @@ def _vector(arrays: Mapping[str, NDArray[Any]], address: Address, budget: Budget
             'index, for example ":,0"'
         )
     budget.take(8 * vector.size)
-    return _numbers(vector)
+    return vector
 
 
-def _numbers(vector: NDArray[Any]) -> Floats:
+def _stamps(vector: NDArray[Any], time: TimeColumn) -> Floats:
+    """Return time stamps (n,) as numbers: in their unit, or of dates in seconds from the first."""
+    if not are_dates(vector):
+        return _numbers(vector, f"numbers or ISO 8601 stamps such as {EXAMPLE}")
+    if time.unit != "s":
+        raise LogError(f"unit: expected s, or none, with dates, got {time.unit}")
+    return seconds_from_first(vector)
+
+
+def _numbers(vector: NDArray[Any], wanted: str = "numbers") -> Floats:
+    """Return values (n,) as float64; raise LogError, saying what was ``wanted``, for anything but real numbers."""
     if vector.dtype.kind in "biuf":
         # Damaged bytes may decode to signaling NaN, on which NumPy warns; check_finite reports them.
         with np.errstate(invalid="ignore"):
@@ -332,7 +348,7 @@ def _numbers(vector: NDArray[Any]) -> Floats:
         try:
             numbers[index] = np.nan if value is None else float(value)
         except (TypeError, ValueError, OverflowError):
-            raise LogError(f"expected numbers, got {shown(value)} at index {index}") from None
+            raise LogError(f"expected {wanted}, got {shown(value)} at index {index}") from None
     return numbers
 
 

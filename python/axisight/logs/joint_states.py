@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import LogError
@@ -47,17 +48,16 @@ def joint_state_map(
     """Return the joint-side column map of the topic with positions and efforts, or positions and targets.
 
     ``arrays`` are the columns of the recording ``where``. Axes are in the order of the joints of ``robot``,
-    or without a robot in that of the topic. If no topic has efforts, the states of trajectory controllers
-    are searched for position targets. Irregular stamps are resampled at their mean rate; the log's notes say
-    so.
+    or without a robot in that of the topic. If no topic has efforts, or only such as are zero or NaN
+    throughout, the states of trajectory controllers are searched for position targets. Irregular stamps are
+    resampled at their mean rate. The log's notes say both.
 
     Raises LogError unless exactly one topic has all required fields of all joints. The message includes
     ``left_out``, the reasons for topics that were not read.
     """
     wanted = None if robot is None else robot.axis_names
     shown_topics: list[str] = []
-    usable: dict[str, list[str]] = {}
-    layout = _LAYOUTS[0]
+    choices: list[tuple[dict[str, str], dict[str, list[str]]]] = []
     for layout in _LAYOUTS:
         topics = _topics(arrays, layout)
         shown_topics += [f"{t}: {', '.join(joints)}" for t, joints in topics.items()]
@@ -67,7 +67,12 @@ def joint_state_map(
             if wanted is None or set(wanted) <= set(joints)
         }
         if usable:
-            break
+            choices.append((layout, usable))
+    layout, usable = choices[0] if choices else (_LAYOUTS[0], {})
+    note = None
+    if layout is _LAYOUTS[0] and len(choices) > 1 and _is_unfilled(arrays, usable):
+        note = f"efforts of {', '.join(usable)} are zero or NaN throughout and count as not logged"
+        layout, usable = choices[1]
     if len(usable) != 1:
         shown = "; ".join(shown_topics) or "none"
         joints = "joints" if wanted is None else ", ".join(wanted)
@@ -83,7 +88,7 @@ def joint_state_map(
         _axis(arrays, topic, joint, layout, slides=prismatic)
         for joint, prismatic in zip(wanted or found, slides, strict=True)
     ]
-    time = {"name": f"{topic}.time_s", "unit": "s", "resample_hz": "mean"}
+    time = {"name": f"{topic}.time_s", "unit": "s", "resample_hz": "mean", "note": note}
     return ColumnMap.model_validate({"time": time, "axis": axes, "side": "joint"})
 
 
@@ -96,6 +101,15 @@ def _topics(arrays: Mapping[str, NDArray[Any]], layout: Mapping[str, str]) -> di
         if mark and f"{topic}.{second}.{joint}" in arrays:
             out.setdefault(topic, []).append(joint)
     return out
+
+
+def _is_unfilled(arrays: Mapping[str, NDArray[Any]], topics: Mapping[str, list[str]]) -> bool:
+    """Whether the efforts of joint states are zero or NaN throughout; False if one cannot be read."""
+    names = [f"{topic}.effort.{joint}" for topic, joints in topics.items() for joint in joints]
+    try:
+        return not any(np.nan_to_num(arrays[name]).any() for name in names)
+    except LogError:
+        return False
 
 
 def _axis(

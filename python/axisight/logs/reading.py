@@ -15,7 +15,7 @@ from axisight.logs.grid import Grid, make_grid
 from axisight.logs.log import Floats, Log, not_logged
 from axisight.logs.map_files import AnyMap
 from axisight.logs.recorded import recorded_rows
-from axisight.logs.sources_lerobot import is_lerobot
+from axisight.logs.sources import log_name
 from axisight.logs.validate import check_axes, check_finite, check_lengths
 
 if TYPE_CHECKING:
@@ -33,8 +33,9 @@ def read_log(
 ) -> Log:
     """Return a log in SI units on a uniform time grid that starts at 0.
 
-    The suffix of `path` chooses the format: .parquet, .csv, .mat (v5, v7.3), .h5, .hdf5, .npz, .mcap, .bag or
-    .db3. A rosbag2 or LeRobot log is a folder; `folder#3` is episode 3 of a LeRobot folder.
+    The suffix of `path` chooses the format: .parquet, .csv, .tsv (both also with .gz), .json, .jsonl, .ndjson,
+    .mat (v5, v7.3), .h5, .hdf5, .npy, .npz, .mcap, .bag or .db3. A rosbag2 or LeRobot log is a folder;
+    `folder#3` is episode 3 of a LeRobot folder.
 
     `columns` is a column map, the path of one, or the name of a shipped one (`ur-rtde`, `franka`, ...).
     None is for files with the native column names of `axisight.case/1`, for ROS recordings and for LeRobot
@@ -134,8 +135,7 @@ def _assemble(found: Gathered, grid: Grid) -> Log:
     position, torque = matrix("position"), matrix("torque")
     assert position is not None
     return Log(
-        # A folder name has no suffix, even if it contains a dot.
-        name=found.path.name if is_lerobot(found.path) else found.path.stem,
+        name=log_name(found.path),
         sample_time_s=grid.sample_time_s,
         time_s=time_s,
         torque_nm=not_logged(position.shape) if torque is None else torque,

@@ -1,11 +1,13 @@
-"""CSV files: a header of names, then rows of numbers."""
+"""CSV files, as text or packed by gzip: a header of names, then rows of numbers."""
 
 from __future__ import annotations
 
+import gzip
+import io
 import warnings
 from collections import Counter
 from pathlib import Path
-from typing import Any, TextIO
+from typing import IO, Any, TextIO, cast
 
 import numpy as np
 import pandas as pd
@@ -28,10 +30,11 @@ def load_csv(path: Path, budget: Budget, options: CsvOptions, *, exact: bool = F
     ``exact``: parse numbers to the last bit, which takes longer.
 
     A last line without a line end becomes a doubt, because the file may be cut inside its last number.
-    Raises LogError for a table that is too wide or too large, or whose rows are longer than its header.
+    Of a file packed by gzip, the text counts against the budget, too. Raises LogError for a table that is too
+    wide or too large, or whose rows are longer than its header.
     """
-    lines, ended = _lines(path)
-    with path.open(encoding="utf-8", newline="") as file:
+    lines, ended = _lines(path, budget)
+    with _text(path) as file:
         separator = _settle(file, options)
         first = pd.read_csv(
             file, sep=separator, header=None, nrows=1, dtype=str, skipinitialspace=True,
@@ -41,7 +44,7 @@ def load_csv(path: Path, budget: Budget, options: CsvOptions, *, exact: bool = F
     if n_columns > _MOST_COLUMNS:
         raise LogError(f"expected at most {_MOST_COLUMNS} columns, got {n_columns}")
     budget.take_values((lines, n_columns), 8)
-    with path.open(encoding="utf-8", newline="") as file:
+    with _text(path) as file:
         _settle(file, options)
         frame = _whole(file, separator, options, exact)
     raw = [str(name).strip() for name in (first.iloc[0] if options.header else range(n_columns))]
@@ -93,11 +96,38 @@ def _settle(file: TextIO, options: CsvOptions) -> str:
     return next((mark for mark in "\t;," if mark in header), " ")
 
 
-def _lines(path: Path) -> tuple[int, bool]:
-    """Return an upper bound on the number of lines, and whether the last line ends as the others do."""
+def header_line(path: Path) -> str:
+    """Return the first line of a CSV file, packed or not."""
+    with _text(path) as file:
+        return file.readline()
+
+
+def is_packed(path: Path) -> bool:
+    """Whether a file is packed by gzip, by its suffix."""
+    return path.suffix.lower() == ".gz"
+
+
+def _bytes(path: Path) -> IO[bytes]:
+    return cast(IO[bytes], gzip.open(path, "rb")) if is_packed(path) else path.open("rb")
+
+
+def _text(path: Path) -> TextIO:
+    return io.TextIOWrapper(cast(Any, _bytes(path)), encoding="utf-8", newline="")
+
+
+def _lines(path: Path, budget: Budget) -> tuple[int, bool]:
+    """Return an upper bound on the number of lines, and whether the last line ends as the others do.
+
+    Raises LogError for a line that is too long, and for a packed text that exceeds the budget.
+    """
     count, last = 0, b""
-    with path.open("rb") as file:
+    with _bytes(path) as file:
         while block := file.read(_BLOCK):
-            count += block.count(b"\n") + block.count(b"\r") - block.count(b"\r\n")
+            if is_packed(path):
+                budget.take(len(block))
+            ends = block.count(b"\n") + block.count(b"\r") - block.count(b"\r\n")
+            if len(block) == _BLOCK and not ends:
+                raise LogError("expected lines of at most 1 MiB, got a longer one")
+            count += ends
             last = block[-1:]
     return count + 1, last in (b"\n", b"\r", b"") or count < 2

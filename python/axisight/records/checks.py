@@ -1,4 +1,4 @@
-"""Check experiments and records for clipping, transients and leakage."""
+"""Check experiments and records for clipping, dead outputs, transients and leakage."""
 
 from __future__ import annotations
 
@@ -47,6 +47,24 @@ def check_clipping(runs: list[Experiment], start: int) -> list[RecordFinding]:
     return findings
 
 
+def check_dead(runs: list[Experiment], start: int) -> list[RecordFinding]:
+    """Return a finding for each output that does not change: serious if it changes in no experiment."""
+    still = np.array([np.ptp(run.output[start:], axis=0) == 0.0 for run in runs])
+    findings = []
+    for c in np.flatnonzero(still.any(axis=0)).tolist():
+        always = bool(still[:, c].all())
+        for e in [None] if always else (np.flatnonzero(still[:, c]) + 1).tolist():
+            value = float(runs[0 if e is None else e - 1].output[start, c])
+            message = (
+                f"dead: expected it to change, got {value:g} throughout; its responses are zero, which says "
+                f"nothing about the robot: look at its column and its sensor"
+            )
+            findings.append(
+                RecordFinding(FindingKind.DEAD, message, always, e, f"output {c + 1}", value)
+            )
+    return findings
+
+
 def keep_steady(
     cut: list[Signals],
     wait: int,
@@ -65,7 +83,10 @@ def keep_steady(
             message = f"{max(len(both), 0)} periods: too few to judge transients and leakage"
             findings.append(RecordFinding(FindingKind.UNJUDGED, message, len(both) < 2, e))
             continue
-        found = steady_state(both, last_line, significance / len(cut))
+        moving = both[:, :, np.ptp(both, axis=(0, 1)) > 0.0]
+        if not moving.size:  # a constant signal is in its steady state
+            continue
+        found = steady_state(moving, last_line, significance / len(cut))
         dropped = max(dropped, wait + found.first)
         again = found.first + 1 + np.flatnonzero(found.p_value[found.first :] < found.significance)
         if found.reached and again.size:

@@ -29,6 +29,8 @@ class FindingKind(StrEnum):
     """An experiment started at another instant of the period; it was aligned."""
     CLIPPED = "clipped"
     """A limit clipped a signal: it stays flat at its extreme after a slope towards it."""
+    DEAD = "dead"
+    """An output does not change: its responses are zero, whatever the robot does."""
     DRIFT = "drift"
     """A linear drift was removed."""
 

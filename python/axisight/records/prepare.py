@@ -24,7 +24,7 @@ from axisight.arguments import (
 from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.logs import Log
-from axisight.records.checks import check_clipping, check_repetition, keep_steady
+from axisight.records.checks import check_clipping, check_dead, check_repetition, keep_steady
 from axisight.records.delays import Delay, advance, reference_delays
 from axisight.records.drift import drift_per_period, remove_drift
 from axisight.records.experiment import Experiment, experiment_of_log
@@ -146,7 +146,7 @@ def prepare_records(
         starts = [start + round(d.samples) % n for d in delays]
         cut = _cut(runs, starts, n)
         findings += _delay_findings(delays)
-    findings += check_clipping(runs, start)
+    findings += check_clipping(runs, start) + check_dead(runs, start)
     wait = -(-_samples("waiting_time_s", waiting_time_s, runs, 1e-9 * n) // n)
     last = int(np.max([*excited, *free]))
     judged = [_without_drift(c) for c in cut] if drift else cut

@@ -71,6 +71,14 @@ def joined(parts: Iterable[Mass]) -> Mass | None:
     return Mass(mass, com, inertia)
 
 
+def mimics(master: str) -> str:
+    """Return why a chain cannot have a joint that follows the joint ``master``."""
+    return (
+        f"expected joints with drives of their own between base and tip, got one that mimics {master!r}: cut it "
+        f"by --tip, it is then locked at zero"
+    )
+
+
 @dataclass(frozen=True)
 class Drive:
     """The drive of a joint as the model file states it, joint-side unless noted.

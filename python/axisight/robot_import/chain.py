@@ -120,12 +120,13 @@ def _joints(tree: Tree, path: Sequence[Body]) -> tuple[list[ChainJoint], Pose, l
     # Start from the orientation in the root frame, in which the file states gravity.
     here = Pose(_from_root(tree, path[0]).rotation, np.zeros(3))
     locked: list[str] = []
+    carried: list[Body] = []
     # Masses that move with the previous joint; those fixed to the base do not matter.
     with_last: list[Mass] = []
     moving: list[tuple[Body, Pose, list[Mass]]] = []
     for body in path[1:]:
         here = here @ body.pose
-        masses = _carried(tree, body, here, chosen, locked)
+        masses = _carried(tree, body, here, chosen, locked, carried)
         if body.motion == "fixed":
             with_last += masses
             continue
@@ -148,6 +149,7 @@ def _joints(tree: Tree, path: Sequence[Body]) -> tuple[list[ChainJoint], Pose, l
         )
         before = at.origin
     notes = [f"locked at zero, masses carried along: {_listed(locked)}"] if locked else []
+    notes += [said for body in carried if (said := _impossible(body))]
     return joints, Pose(here.rotation, here.origin - before), notes
 
 
@@ -158,15 +160,44 @@ def _from_root(tree: Tree, body: Body) -> Pose:
     return pose
 
 
-def _carried(tree: Tree, body: Body, here: Pose, chosen: set[str], locked: list[str]) -> list[Mass]:
-    """Return the masses of a body and of all its branches outside the chain, in the base frame."""
+def _carried(
+    tree: Tree,
+    body: Body,
+    here: Pose,
+    chosen: set[str],
+    locked: list[str],
+    carried: list[Body],
+) -> list[Mass]:
+    """Return the masses of a body and of all its branches outside the chain, in the base frame.
+
+    The names of the joints that are thereby locked go to ``locked``, and all these bodies to ``carried``.
+    """
     out = [] if body.mass is None else [body.mass.at(here)]
+    carried.append(body)
     for child in tree.children(body.name):
         if child.name not in chosen:
             if child.motion != "fixed":
                 locked.append(child.joint)
-            out += _carried(tree, child, here @ child.pose, chosen, locked)
+            out += _carried(tree, child, here @ child.pose, chosen, locked, carried)
     return out
+
+
+# Moments with three digits are off by up to 0.5 % each, so those of a plate, where the largest is the sum of
+# the others, may violate the triangle inequality by 1 % of the largest.
+_ROUNDED = 0.01
+
+
+def _impossible(body: Body) -> str | None:
+    """Return a note if the principal moments of a body violate the triangle inequality; None if not."""
+    if body.mass is None:
+        return None
+    low, middle, high = np.linalg.eigvalsh(body.mass.inertia_kg_m2).tolist()
+    if high - low - middle <= _ROUNDED * high:
+        return None
+    return (
+        f"inertia of {(body.of or body.name)!r}: principal moments {low:g}, {middle:g}, {high:g} kg m^2, of which "
+        f"no body has one above the sum of the others: taken as it is, look at its numbers"
+    )
 
 
 def _check(body: Body, mass: Mass | None) -> None:

@@ -12,7 +12,17 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from axisight.errors import MissingExtraError, RobotError
-from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Steps, Tree, still
+from axisight.robot_import.bodies import (
+    Body,
+    Drive,
+    Mass,
+    Motion,
+    Pose,
+    Steps,
+    Tree,
+    mimics,
+    still,
+)
 from axisight.robot_import.mjcf_actuators import Actuators
 from axisight.robot_import.mjcf_notes import notes_of
 from axisight.robot_import.outside import with_includes
@@ -71,6 +81,14 @@ class _Compiled:
         self.motions: dict[int, Motion] = {
             int(kinds.mjJNT_HINGE): "revolute",
             int(kinds.mjJNT_SLIDE): "prismatic",
+        }
+
+        # Joints that an equality constraint makes functions of other joints.
+        coupled = model.eq_active0 & (model.eq_type == self.mujoco.mjtEq.mjEQ_JOINT)
+        self.masters = {
+            int(model.eq_obj1id[i]): int(model.eq_obj2id[i])
+            for i in np.flatnonzero(coupled)
+            if model.eq_obj2id[i] >= 0
         }
 
     def tree(self) -> Tree:
@@ -139,14 +157,12 @@ class _Compiled:
         if ("joint", name) not in self.lines:
             where = self.free.get(body, where)
         motion = self.motions.get(int(model.jnt_type[j]), "other")
-        refused = (
-            ""
-            if motion != "other"
-            else (
+        refused = mimics(self._name("joint", self.masters[j])) if j in self.masters else ""
+        if motion == "other":
+            refused = (
                 "expected hinge and slide joints between base and tip, got a ball or free joint: choose "
                 "them beyond it by --base and --tip"
             )
-        )
         at = pose @ Pose(np.eye(3), model.jnt_pos[j] - anchor)
         if motion != "other":
             dof, zero = model.jnt_dofadr[j], float(model.qpos0[model.jnt_qposadr[j]])

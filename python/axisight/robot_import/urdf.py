@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from axisight.arguments import shown
 from axisight.errors import RobotError
-from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, still
+from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, mimics, still
 from axisight.robot_import.urdf_transmissions import gear_ratios
 from axisight.robot_import.xml_tree import Element
 
@@ -135,10 +135,7 @@ def _body(
         )
     mimic = joint.find("mimic")
     if mimic is not None:
-        refused = (
-            f"expected joints with drives of their own between base and tip, got one that mimics "
-            f"{mimic.attributes.get('joint', '?')!r}: cut it by --tip, it is then locked at zero"
-        )
+        refused = mimics(mimic.attributes.get("joint", "?"))
     return Body(
         name,
         _end(joint, "parent", links),

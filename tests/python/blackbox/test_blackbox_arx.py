@@ -1,6 +1,7 @@
 """ARX models: identities, oracles, recovery, uncertainty, orders, misuse."""
 
 import sys
+from dataclasses import replace
 
 import control
 import numpy as np
@@ -10,6 +11,7 @@ from scipy import signal
 import blackbox_data as known
 from axisight.blackbox import arx, arx_orders, fit_percent, residual_tests
 from axisight.errors import InputError
+from axisight.frf import Flag
 from axisight.records.experiment import Experiment
 
 TRUTH = np.concatenate(
@@ -211,3 +213,21 @@ def test_fit_percent_is_3_54() -> None:
 def test_misuse_is_named(call, words: str) -> None:
     with pytest.raises(InputError, match=words):
         call(known.arx_experiment(100, 0.1, 1))
+
+
+@pytest.mark.parametrize(("pole", "line"), [(1.0, 0), (-1.0, -1)])
+def test_a_line_on_a_pole_has_no_response(pole: float, line: int) -> None:
+    """As of a state-space model: at 0 Hz of an integrator, and at Nyquist; other lines stay."""
+    model = arx(known.arx_experiment(200, 0.0, 1), na=2, nb=2)
+    first = np.stack([np.eye(2), -pole * np.eye(2)])
+    on_pole = replace(model, na=np.ones((2, 2), int), a=first)
+    f = np.array([0.0, 100.0, 0.5 / model.sample_time_s])
+    found = on_pole.response(f)
+    flag = found["flag"].values
+    assert flag[line] == Flag.RANK_DEFICIENT
+    assert np.isnan(found["response"].values[line]).all()
+    assert np.isnan(found["variance"].values[line]).all()
+    others = np.delete(np.arange(3), line)
+    assert (flag[others] == Flag.GOOD).all()
+    assert np.isfinite(found["response"].values[others]).all()
+    assert np.isfinite(found["variance"].values[others]).all()

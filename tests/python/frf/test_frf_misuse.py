@@ -76,6 +76,23 @@ def test_lines_of_deficient_rank(
     assert frf.explain_flags(frf.mfrf(records)) == []
 
 
+@pytest.mark.parametrize("level", [0.0, 0.3])
+def test_an_output_that_never_changes_is_explained(level: float) -> None:
+    """Its response is zero or rounding at every line, which no flag of a line says."""
+    records = loop_records()[0]
+    output = records.output.copy()
+    output[..., 1] = level
+    bad = replace(records, output=output)
+    found = frf.mfrf(bad)
+    assert (found["flag"] == frf.Flag.GOOD).all()
+    (said,) = frf.explain_flags(found, bad)
+    assert said.startswith(f"output 2: expected it to change, got {level:g} throughout")
+    if level == 0.0:
+        assert frf.explain_flags(found) == [
+            "output 2: expected a response, got zero at every line: the channel is dead"
+        ]
+
+
 def test_badly_conditioned_lines_are_given_and_flagged() -> None:
     records = loop_records()[0]
 

@@ -1,9 +1,11 @@
 """Damage of any kind, seeded: no reader is killed, hangs, swells, or raises what is not the package's."""
 
+import gzip
 import json
 
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.io
 
@@ -21,6 +23,49 @@ def test_damaged_logs(tmp_path, name, kind):
     rng = np.random.default_rng([8, FORMATS.index((name, kind))])
     path = write(tmp_path / name, native_columns(120, 1, 100.0), kind)
     sound(read_in_child(batch(tmp_path, path, rng), seconds=10, limit=3 * 10**9))
+
+
+def test_damaged_text_that_is_packed(tmp_path):
+    """The text is damaged, and the packing sound."""
+    rng = np.random.default_rng(14)
+    text = write(tmp_path / "a.csv", native_columns(120, 1, 100.0)).read_bytes()
+    paths = [tmp_path / f"{number}.csv.gz" for number in range(TIMES)]
+    for path in paths:
+        path.write_bytes(gzip.compress(mutated(text, rng)))
+    sound(read_in_child(paths, seconds=10, limit=3 * 10**9))
+
+
+@pytest.mark.parametrize("kind", ["csv", "json", "jsonl"])
+def test_damaged_dates(tmp_path, kind):
+    """Most of the damage is in the dates."""
+    columns = native_columns(120, 1, 100.0)
+    when = pd.Timestamp("2024-10-27T00:59:59Z") + pd.to_timedelta(columns["time_s"], unit="s")
+    columns = {"time_s": [t.isoformat() for t in when]} | {
+        name: np.round(columns[name], 1) for name in ("position_1", "torque_cmd_1")
+    }
+    path = write(tmp_path / f"a.{kind}", columns)
+    assert read_log(path).n_samples == 120
+    rng = np.random.default_rng([15, len(kind)])
+    sound(read_in_child(batch(tmp_path, path, rng), seconds=10, limit=3 * 10**9))
+
+
+NESTED = """
+time = { name = "t" }
+[[axis]]
+position = { name = "joints[0].q", unit = "rad" }
+torque = { name = "tau[0]", unit = "Nm" }
+"""
+
+
+@pytest.mark.parametrize("kind", ["json", "jsonl"])
+def test_damaged_records_in_records(tmp_path, kind):
+    rows = [{"t": k / 100, "joints": [{"q": k / 7}], "tau": [k, 1]} for k in range(120)]
+    text = [json.dumps(row) for row in rows]
+    path = tmp_path / f"a.{kind}"
+    path.write_text(f"[{','.join(text)}]" if kind == "json" else "\n".join(text))
+    assert read_log(path, parse_column_map(NESTED)).n_samples == 120
+    rng = np.random.default_rng([16, len(kind)])
+    sound(read_in_child(batch(tmp_path, path, rng), NESTED, seconds=10, limit=3 * 10**9))
 
 
 def packed_mat(path):
@@ -148,10 +193,12 @@ def test_damaged_maps_and_cases(tmp_path):
     path = write(tmp_path / "a.csv", native_columns(120, 1, 100.0))
     (tmp_path / "robot.toml").touch()
     rng = np.random.default_rng(12)
-    maps = [RUN.replace("run.", ""), named_map_text("ur-rtde"), named_map_text("franka")]
+    zeros = RUN.replace("run.", "").replace('"rad" }', '"rad", offset = 1.5 }')
+    ranges = zeros.replace("offset = 1.5", "raw_range = [0, 2], unit_range = [1, 3]")
+    maps = [zeros, named_map_text("ur-rtde"), named_map_text("franka"), ranges]
 
     def one_map(number):
-        text = mutated(maps[number % 3].encode(), rng).decode("utf-8", "replace")
+        text = mutated(maps[number % 4].encode(), rng).decode("utf-8", "replace")
         check_log(path, parse_column_map(text))
 
     refused_only(one_map)

@@ -46,7 +46,7 @@ SAID: dict[str, tuple[type[Exception], dict[str, str]]] = {
             "tag.mat": "byte 136: flags: expected an element of type 6",
             "twice.csv": "position_1: expected one column of that name, got 2",
             "wide.csv": "at most 10000 columns, got 10001",
-            "words.csv": "time_s: expected numbers, got 'noon'",
+            "words.csv": "time_s: expected numbers or ISO 8601 stamps.*got 'noon'",
         },
     ),
     "recordings": (

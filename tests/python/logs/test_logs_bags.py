@@ -122,6 +122,43 @@ def test_states_of_a_trajectory_controller_are_targets_and_positions(
     assert read_log(whole, robot=robot).has_torque
 
 
+@pytest.mark.parametrize("nothing", [0.0, np.nan])
+def test_efforts_that_nobody_filled_hide_no_controller(
+    tmp_path: Path, robot: Robot, nothing: float
+):
+    """Joint states with a dead effort, beside the states of a trajectory controller."""
+    told = POSITION + 0.01
+    more = controller_states(NAMES, TIME, told, POSITION, "new")
+    states = (POSITION, VELOCITY, np.full_like(EFFORT, nothing))
+    path = written_states(tmp_path / "run", "mcap", TIME, NAMES, states, more=more)
+    log = read_log(path, robot=robot)
+    assert not log.has_torque
+    ratio = np.array([1 / 50, 1.0])
+    np.testing.assert_allclose(log.position_ref_rad, told[:, ::-1] / ratio, rtol=1e-12)
+    said = "efforts of joint_states are zero or NaN throughout and count as not logged"
+    assert any(note.startswith(said) for note in log.notes)
+    # Without targets, the efforts are all that there is.
+    alone = written_states(tmp_path / "alone", "mcap", TIME, NAMES, states)
+    if nothing == 0.0:
+        assert read_log(alone, robot=robot).has_torque
+    else:
+        with pytest.raises(LogError, match="NaN"):
+            read_log(alone, robot=robot)
+
+
+def test_a_controller_with_speeds_and_a_dead_effort_is_read(tmp_path: Path, robot: Robot):
+    """Efforts of NaN in the state of the controller itself, beside targets of speeds."""
+    told = POSITION + 0.01
+    more = controller_states(NAMES, TIME, told, POSITION, "new", speeds=VELOCITY, effort=np.nan)
+    path = written_states(
+        tmp_path / "run", "mcap", TIME, NAMES, (POSITION, VELOCITY, []), more=more
+    )
+    log = read_log(path, robot=robot)
+    assert not log.has_torque
+    assert log.position_ref_rad is not None
+    assert log.velocity_ref_rad_s is not None
+
+
 def test_two_topics_of_the_same_joints_need_a_map(tmp_path: Path, robot: Robot):
     def again(writer, types):
         connection = writer.add_connection(

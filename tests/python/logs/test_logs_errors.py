@@ -40,8 +40,9 @@ def refuse(path, *words, columns=None, n_axes=None):
 def test_truncated_file(tmp_path, name, kind, share):
     path = write(tmp_path / name, native_columns(), kind)
     content = path.read_bytes()
-    if path.suffix == ".csv":  # cut behind a comma: the last row then lacks values
-        cut = content.rfind(b",", 0, int(share * len(content))) + 1
+    if path.suffix in {".csv", ".tsv"}:  # cut behind a separator: the last row then lacks values
+        separator = b"," if path.suffix == ".csv" else b"\t"
+        cut = content.rfind(separator, 0, int(share * len(content))) + 1
         expected = "finite" if share else "truncated, corrupt"
     else:
         cut, expected = int(share * len(content)), "truncated, corrupt"
@@ -49,7 +50,22 @@ def test_truncated_file(tmp_path, name, kind, share):
     refuse(path, expected)
 
 
-@pytest.mark.parametrize("suffix", [".parquet", ".mat", ".h5", ".npz", ".csv"])
+@pytest.mark.parametrize(
+    "suffix",
+    [
+        ".parquet",
+        ".mat",
+        ".h5",
+        ".npz",
+        ".csv",
+        ".csv.gz",
+        ".tsv",
+        ".tsv.gz",
+        ".json",
+        ".jsonl",
+        ".npy",
+    ],
+)
 def test_corrupt_file(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     path.write_bytes(np.random.default_rng(0).bytes(5000))

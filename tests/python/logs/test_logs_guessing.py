@@ -490,8 +490,8 @@ def test_the_stamps_of_the_bench_are_in_us(shared_data, tmp_path):
         ("time,position_1,torque_1\n[s],[deg],[Nm]\n", "position_1 (no numbers: row 1 is '[deg]')"),
         ('time,q,tau\n0.0,"[0.0, 1.0]","[2.0, 3.0]"\n', "q (no numbers: row 1 is '[0.0, 1.0]')"),
         (
-            "stamp,q,tau\n2024-05-01 12:00:00.000,0.0,1.0\n",
-            "stamp (no numbers: row 1 is '2024-05-01",
+            "stamp,q,tau\n1.5.2024 12:00:00.000,0.0,1.0\n",
+            "stamp (no numbers: row 1 is '1.5.2024",
         ),
     ],
 )
@@ -528,3 +528,48 @@ def test_a_map_has_the_line_that_bridges_a_hole(tmp_path):
     rate = round(1.0 / float(np.median(np.diff(columns["t"]))))
     assert f"# resample_hz = {rate}  # take off the # to bridge" in found.text
     assert any("hole" in doubt for doubt in found.doubts)
+
+
+def turning() -> dict[str, np.ndarray]:
+    """Return a pendulum that swings over: joint-side angle up to 32 rad, speed, torque."""
+    t = np.arange(2000) / 200
+    speed = 4 * np.cos(2 * t) + 3
+    return {"t": t, "theta": 2 * np.sin(2 * t) + 3 * t, "omega": speed, "tau": -8 * np.sin(2 * t)}
+
+
+@pytest.mark.parametrize("unit", ["rad", "deg"])
+@pytest.mark.parametrize("named", ["omega_{}_s", "omega_ref_{}_s", "theta_ref_{}"])
+def test_a_unit_in_another_name_says_that_of_several_turns(tmp_path, named, unit):
+    run = turning()
+    factor = DEG if unit == "deg" else 1.0
+    made = {"t": run["t"], "theta": run["theta"] * factor, "tau": run["tau"]}
+    made[named.format(unit)] = run["omega" if named.startswith("omega") else "theta"] * factor
+    found = guess_columns(write_csv(tmp_path / "a.csv", made))
+    (axis,) = found.columns.axis
+    assert axis.position.unit == unit
+    other = axis.velocity or axis.velocity_ref or axis.position_ref
+    assert other.name == named.format(unit)
+    assert other.unit.startswith(unit)
+    assert not any(doubt.startswith("position: ") for doubt in found.doubts)
+
+
+def test_a_target_in_another_unit_than_its_positions(tmp_path):
+    """The target is in rad by its name, and the positions are 57.3 times as much."""
+    run = turning()
+    made = {"t": run["t"], "theta": run["theta"] * DEG, "tau": run["tau"]}
+    found = guess_columns(write_csv(tmp_path / "a.csv", made | {"theta_ref_rad": run["theta"]}))
+    (axis,) = found.columns.axis
+    assert axis.position.unit == "deg"
+    assert axis.position_ref is None or axis.position_ref.unit == "rad"
+
+
+@pytest.mark.parametrize("speed", [False, True])
+def test_several_turns_of_which_nothing_tells_the_unit_are_doubtful(tmp_path, speed):
+    run = turning()
+    made = {name: values for name, values in run.items() if speed or name != "omega"}
+    found = guess_columns(write_csv(tmp_path / "a.csv", made))
+    said = (
+        "position: deg by size (31.8), doubtful: in rad a joint turns 5.1 times, or it is a motor"
+    )
+    assert any(doubt.startswith(said) for doubt in found.doubts)
+    assert f"# doubtful: {said}" in found.text

@@ -104,6 +104,9 @@ def test_two_that_positions_follow_are_a_choice(tmp_path):
 def test_the_unit_in_the_name_of_a_target_is_in_its_line(tmp_path):
     made = columns("pos_{j}_rad", "x_{j}")
     made |= {f"cmd_{j}_deg": made[f"x_{j}"] * DEG for j in JOINTS}
+    # Positions in rad follow it.
+    assert '\nposition_ref = { name = "cmd_yaw_deg", unit = "deg" }' in guessed(tmp_path, made).text
+    made |= {f"cmd_{j}_deg": np.cos(np.arange(made["t"].size)) for j in JOINTS}
     assert '# position_ref = { name = "cmd_yaw_deg", unit = "deg" }' in guessed(tmp_path, made).text
 
 

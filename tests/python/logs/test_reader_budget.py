@@ -1,5 +1,6 @@
 """Small files cannot cost much: what they declare is held against a limit before it is read."""
 
+import gzip
 import io
 import zipfile
 from pathlib import Path
@@ -107,6 +108,78 @@ def test_csv_with_a_wide_header_and_short_rows(tmp_path):
     refused(tmp_path / "b.csv", "expected at most 10000 columns, got 20000")
 
 
+HEADER = b"time_s,position_1,torque_cmd_1\n"
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        (b"0,0,0\n", "by what the file declares"),
+        (b"0,", "expected lines of at most 1 MiB"),
+        (b"a,", "expected lines of at most 1 MiB"),
+        (b"\n", "by what the file declares"),
+        (b'"', "expected lines of at most 1 MiB"),
+    ],
+    ids=["rows", "one_long_row", "texts_in_one_row", "empty_lines", "one_quoted_text"],
+)
+def test_packed_text_that_unpacks_to_much(tmp_path, row, words):
+    with gzip.open(tmp_path / "a.csv.gz", "wb") as file:
+        file.write(HEADER)
+        for _ in range(100):
+            file.write(row * (3_000_000 // len(row)))
+    assert (tmp_path / "a.csv.gz").stat().st_size < 500_000
+    refused(tmp_path / "a.csv.gz", words)
+
+
+def test_packed_text_just_below_the_limit(tmp_path):
+    """Numbers that become objects, as one row holds a text: 43 MB of text and values of 67."""
+    with gzip.open(tmp_path / "a.csv.gz", "wb") as file:
+        file.write(HEADER)
+        file.write(b"0.1,0.1,0.1\n" * 1_200_000 + b"x,x,x\n")
+    refused(tmp_path / "a.csv.gz", "expected numbers")
+
+
+def test_a_long_line_is_refused_unpacked_too(tmp_path):
+    (tmp_path / "a.csv").write_bytes(HEADER + b"0," * 1_500_000)
+    refused(tmp_path / "a.csv", "expected lines of at most 1 MiB")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 100_000,
+        "[" + "[]," * 500_000 + "[]]",
+        "[" + '{"a":0},' * 300_000 + '{"a":0}]',
+        "[" + ",".join(f'{{"a{k}":0}}' for k in range(200_000)) + "]",
+        "{" + ",".join(f'"a{k}":0' for k in range(200_000)) + "}",
+        '{"time_s": [' + "1" * 5000 + ', 1], "position_1": [1, 2]}',
+        '{"time_s": ["' + "1" * 10**6 + '"' + ', ""' * 10**6 + "]}",
+        '{"time_s": [' + "1e999," * 300_000 + "1]}",
+    ],
+    ids=[
+        "deep",
+        "empty_lists",
+        "small_records",
+        "other_key_in_every_record",
+        "wide",
+        "digits",
+        "one_long_text",
+        "infinite",
+    ],
+)
+def test_json_that_becomes_much(tmp_path, text):
+    (tmp_path / "a.json").write_text(text)
+    refused(tmp_path / "a.json")
+
+
+def test_an_array_that_declares_much(tmp_path):
+    with (tmp_path / "a.npy").open("wb") as file:
+        descr = [(name, "<f8") for name in ("time_s", "position_1", "torque_cmd_1")]
+        head = {"descr": descr, "fortran_order": False, "shape": (40_000_000,)}
+        np.lib.format.write_array_header_1_0(file, head)
+    refused(tmp_path / "a.npy", "960 MB by what")
+
+
 def mat73_cells(path, depth):
     """Cells that name the one before twice each: 2**depth by name, few in the file."""
     with h5py.File(path, "w", userblock_size=512) as file:
@@ -201,10 +274,14 @@ def test_columns_that_nobody_maps_are_not_read(tmp_path):
     }
 
 
-@pytest.mark.parametrize("suffix", [".npz", ".h5", ".parquet", ".csv", ".mat"])
+@pytest.mark.parametrize(
+    "suffix", [".npz", ".h5", ".parquet", ".csv", ".mat", ".tsv", ".json", ".jsonl", ".npy"]
+)
 def test_the_limit_is_the_callers_to_set(tmp_path, suffix):
     path = write(tmp_path / f"a{suffix}", native_columns(n=1000, n_axes=1))
-    assert read_log(path, max_bytes=130_000).n_samples == 1000
+    # The text of JSON is in memory beside its values.
+    text = path.stat().st_size if suffix.startswith(".json") else 0
+    assert read_log(path, max_bytes=130_000 + text).n_samples == 1000
     with pytest.raises(LogError, match=r"expected at most 0\.02 MB .*max_bytes.*raises the limit"):
         read_log(path, max_bytes=20_000)
     assert not check_log(path, max_bytes=20_000).ok

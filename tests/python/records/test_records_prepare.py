@@ -176,6 +176,22 @@ def test_a_cut_torque_is_said():
     assert found[0].value == pytest.approx(runs3.mean(), rel=0.6)
 
 
+@pytest.mark.parametrize("level", [0.0, 0.3])
+def test_an_output_that_never_changes_is_said(level):
+    """Its responses would be zero, as if the robot did not move; one that rests in a single run may be true."""
+    run = experiment(noise=1e-3)
+    dead = replace(run, output=np.column_stack([run.output, np.full(len(run.output), level)]))
+    other = replace(run, output=np.column_stack([run.output, run.output]))
+    got = prepare_records([dead, dead])
+    (found,) = [f for f in got.findings if f.kind is FindingKind.DEAD]
+    assert (found.signal, found.experiment, found.serious) == ("output 2", None, True)
+    assert "expected it to change, got" in found.message
+    got = prepare_records([other, dead])
+    (found,) = [f for f in got.findings if f.kind is FindingKind.DEAD]
+    assert (found.signal, found.experiment, found.serious) == ("output 2", 2, False)
+    assert FindingKind.DEAD not in kinds(prepare_records([other, other]))
+
+
 def test_flat_tops_that_are_meant_are_no_clipping():
     t = np.arange(4000)
     slow = np.sin(2 * np.pi * t / 1000)

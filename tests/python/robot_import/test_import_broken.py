@@ -228,6 +228,13 @@ BROKEN_MJCF = {
         ),
         r"<joint 'elbow'>.*ball or free",
     ),
+    "mimic": (
+        mjcf(
+            "</actuator>",
+            '</actuator><equality><joint joint1="elbow" joint2="shoulder"/></equality>',
+        ),
+        r"line 9, <joint 'elbow'>: .*mimics 'shoulder': cut it by --tip",
+    ),
     "free base": (
         mjcf(BODY, BODY + "<freejoint/>")
         .replace(

@@ -188,6 +188,51 @@ def test_what_an_mjcf_has_beyond_a_chain_is_listed(tmp_path: Path):
     assert "actuators of elbow are told positions, those of other joints are not" in robot.toml
 
 
+def test_joints_that_mimic_others_are_locked_beyond_the_tip(tmp_path: Path):
+    """As in a URDF; a constraint that is switched off couples nothing."""
+    coupled = '<equality><joint joint1="slide" joint2="shoulder"{}/></equality>'
+    text = changed(MJCF, "</actuator>", "</actuator>" + coupled.format(""))
+    with pytest.raises(
+        RobotError, match="<joint 'slide'>: expected joints with drives of their own"
+    ):
+        import_robot(written(tmp_path, text, "arm.xml"))
+    robot = import_robot(written(tmp_path, text, "cut.xml"), tip="upper")
+    assert robot.axis_names == ["shoulder"]
+    assert "locked at zero, masses carried along: elbow, slide" in robot.toml
+    off = changed(MJCF, "</actuator>", "</actuator>" + coupled.format(' active="false"'))
+    assert import_robot(written(tmp_path, off, "off.xml")).n_axes == 3
+
+
+# Principal moments of a link: whether a note says that no body has them.
+MOMENTS = {
+    "a sphere": ((0.02, 0.02, 0.02), False),
+    "a plate": ((0.02, 0.03, 0.05), False),
+    "a plate of three digits": ((0.0204, 0.0304, 0.0511), False),
+    "no body": ((0.02, 0.03, 0.06), True),
+}
+
+
+@pytest.mark.parametrize("name", MOMENTS)
+def test_an_inertia_that_no_body_has_is_listed(tmp_path: Path, name: str):
+    """Moments of three digits are off by up to 0.5 % each, which makes a plate violate the rule by 1 %."""
+    (xx, yy, zz), listed = MOMENTS[name]
+    text = changed(
+        URDF,
+        'ixx="0.02" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.025"',
+        f'ixx="{xx}" iyy="{yy}" izz="{zz}"',
+    )
+    robot = import_robot(written(tmp_path, text))
+    said = "inertia of 'lower': principal moments 0.02, 0.03, 0.06 kg m^2, of which no body has one above the sum"
+    assert (said in robot.toml) is listed
+    assert ("of which no body has" in robot.toml) is listed
+    file = changed(MJCF, 'diaginertia="0.02 0.03 0.025"', f'diaginertia="{xx} {yy} {zz}"')
+    if listed or name == "a plate of three digits":  # MuJoCo refuses both itself
+        with pytest.raises(RobotError, match=r"MuJoCo: .*A \+ B >= C"):
+            import_robot(written(tmp_path, file, "arm.xml"))
+    else:
+        assert "of which no body has" not in import_robot(written(tmp_path, file, "arm.xml")).toml
+
+
 MOTOR = '<motor joint="shoulder" gear="50"/>'
 # What a chain has no number for: where it stands, and what is said of it.
 BEYOND = {

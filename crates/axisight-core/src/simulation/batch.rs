@@ -215,6 +215,11 @@ impl Group<'_> {
                 let plant = assemble::<Lanes<LANES>>(batch.robot, &[], &lifted)?;
                 self.nonlinear(batch, &plant, Stepper::new(&plant), &lanes)?
             };
+            if let Status::Cancelled(first) = outcome.status {
+                for lane in &lanes {
+                    self.blank(*lane, first);
+                }
+            }
             if matches!(outcome.status, Status::Completed | Status::Cancelled(_)) {
                 return Ok(vec![outcome; lanes.len()]);
             }
@@ -366,5 +371,62 @@ impl Batch<'_> {
             method: self.method,
             cancel: self.cancel,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot_file::read_robot;
+
+    const LEVER: &str = r#"
+schema = "axisight.robot/2"
+name = "lever"
+gravity = [0.0, 0.0, -9.81]
+sample_time = 1e-3
+[[joint]]
+name = "axis1"
+kind = "driven"
+origin = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+[joint.link]
+mass = 2.0
+com = [0.1, 0.0, 0.0]
+inertia = [0.02, 0.02, 0.02, 0.0, 0.0, 0.0]
+[joint.drive]
+gear_ratio = 0.02
+motor_inertia = 1e-4
+viscous_friction = 1e-3
+[operating_point]
+joint_angle = [0.2]
+"#;
+
+    /// One run alone, and a group of runs in lock-step, by both sets of equations.
+    #[test]
+    fn a_cancelled_run_has_no_values() {
+        let robot = read_robot(LEVER).expect("a valid robot");
+        let cancel = AtomicBool::new(true);
+        for model in [Model::Nonlinear, Model::Linear] {
+            for runs in [1, 3] {
+                let input = vec![vec![0.1; 20]; runs];
+                let batch = Batch {
+                    robot: &robot,
+                    settings: &[],
+                    start: &[vec![0.2]],
+                    input: BatchInput::Torque(&input),
+                    noise: &[],
+                    resolution: 0.0,
+                    model,
+                    method: Method::RungeKutta4 { substeps: 1 },
+                    cancel: Some(&cancel),
+                };
+                let (traces, outcomes) = simulate_batch(&batch).expect("a valid batch");
+                assert!(outcomes.iter().all(|o| o.status == Status::Cancelled(0)));
+                assert_eq!(traces.measured.len(), 20 * runs);
+                for signal in [&traces.measured, &traces.motor, &traces.joint] {
+                    assert!(signal.iter().all(|x| x.is_nan()), "{model:?}, {runs} runs");
+                }
+            }
+        }
     }
 }

@@ -40,7 +40,7 @@ pub struct Spectra {
 /// lines.
 ///
 /// At a singular line the experiments do not excite all inputs, and the response is NaN. `omega`
-/// holds the angular frequency of each line [rad/s].
+/// holds the angular frequency of each line [rad/s]. Without experiments there is no response.
 pub fn response(experiments: &[Spectra], omega: &[f64], output: Output) -> (Vec<C>, usize) {
     let n = experiments.len();
     let mut solver = SmallSolver::new(n);
@@ -48,7 +48,12 @@ pub fn response(experiments: &[Spectra], omega: &[f64], output: Output) -> (Vec<
     let nan = C::new(f64::NAN, f64::NAN);
     let mut out = vec![nan; omega.len() * n * n];
     let mut singular = 0;
-    for ((line, w), g) in omega.iter().enumerate().zip(out.chunks_exact_mut(n * n)) {
+    // Chunks of length zero panic; without experiments there is nothing to cut.
+    for ((line, w), g) in omega
+        .iter()
+        .enumerate()
+        .zip(out.chunks_exact_mut((n * n).max(1)))
+    {
         let factor = output.factor(*w);
         for (e, spectra) in experiments.iter().enumerate() {
             for axis in 0..n {
@@ -59,4 +64,27 @@ pub fn response(experiments: &[Spectra], omega: &[f64], output: Output) -> (Vec<
         singular += usize::from(!solver.right_divide(&y, &u, g));
     }
     (out, singular)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_experiments_give_no_response() {
+        assert_eq!(response(&[], &[1.0, 2.0], Output::Position), (vec![], 0));
+    }
+
+    /// An output of twice the input, at its second derivative.
+    #[test]
+    fn one_axis_is_a_ratio() {
+        let (one, two) = (C::new(1.0, 0.5), C::new(2.0, 1.0));
+        let experiment = Spectra {
+            input: vec![one],
+            output: vec![two],
+        };
+        let (g, singular) = response(&[experiment], &[3.0], Output::Acceleration);
+        assert_eq!(singular, 0);
+        assert!((g[0] - C::new(-18.0, 0.0)).norm() < 1e-14);
+    }
 }

@@ -12,8 +12,7 @@ from axisight.arguments import shown, usable_path
 from axisight.errors import CaseError, InputError
 from axisight.gap.facts.settings import Settings
 from axisight.logs import AnyMap, Case, Log, read_case, read_log
-from axisight.logs.sources import is_folder_log
-from axisight.logs.sources_bag import BAG_SUFFIXES
+from axisight.logs.sources import LOG_SUFFIXES, is_folder_log, suffix_of
 from axisight.logs.tables import is_table, log_of_table
 from axisight.robot import Robot, load_robot
 from axisight.robot.presets import PRESETS
@@ -21,7 +20,6 @@ from axisight.robot.sources import MODEL_SUFFIXES
 
 # Suffixes of robot files; tables (.csv) may be logs.
 _ROBOTS = {*MODEL_SUFFIXES, ".toml"} - {".csv"}
-_LOG_SUFFIXES = {".parquet", ".csv", ".mat", ".h5", ".hdf5", ".npz", *BAG_SUFFIXES}
 _HOW = "diagnose(robot, logs, validation=...)"
 _ONE_LOG = (
     "validation: expected logs to hold out, or at least two logs, got one log; "
@@ -144,7 +142,7 @@ def _sorted_out(
 
 def _is_log(path: Path) -> bool:
     """Whether a path stands for a log: by its suffix, or as the folder of a recording."""
-    return is_folder_log(path) or (path.suffix.lower() in _LOG_SUFFIXES and not path.is_dir())
+    return is_folder_log(path) or (suffix_of(path) in LOG_SUFFIXES and not path.is_dir())
 
 
 def _case_folder(path: Path, *, alone: bool) -> Path:

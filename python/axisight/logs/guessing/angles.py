@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from axisight.logs.guessing.draft import Draft
 from axisight.logs.guessing.evidence import (
     LARGEST_JOINT_DEG,
@@ -14,6 +16,7 @@ from axisight.logs.guessing.evidence import (
 from axisight.logs.guessing.families import Axis, Family, of_quantity
 from axisight.logs.guessing.measured import measured
 from axisight.logs.guessing.names import WORDS, called_after
+from axisight.logs.guessing.targets import followed
 from axisight.logs.units import PRISMATIC_UNITS, si_factor
 
 _POSITION_UNITS = ("rad", "deg", "rev")
@@ -133,19 +136,39 @@ def _unit(draft: Draft, family: Family) -> tuple[str, str]:
     if named is not None:
         raise draft.refusal(
             f"position: expected a unit of angles or lengths, got {named} in {family.label}; write a map "
-            f"with counts_per_rev"
+            f"with counts_per_rev, and with offset if the encoder does not read 0 at zero"
         )
-    for velocity in of_quantity(draft.families, "velocity"):
+    return _by_velocities(draft) or _by_targets(draft) or _by_size(draft, family)
+
+
+def _by_velocities(draft: Draft) -> tuple[str, str] | None:
+    """Return the unit that fits a velocity, measured or a target, and the reason; None without one."""
+    measured = of_quantity(draft.families, "velocity")
+    for velocity in (*measured, *of_quantity(draft.families, "velocity", wanted=True)):
         signals = velocity.of(draft.axes)
-        if signals is not None:
-            seen = agreement(draft.signals("position"), signals, draft.sample_time_s)
-            unit = _by_velocity(seen, velocity.meaning.unit)
-            if unit is not None:
-                return unit, (
-                    f"{unit}, as {velocity.label} is {seen.ratio:.4g} times the derivative "
-                    f"(correlation {seen.alike:.3f})"
-                )
-    return _by_size(draft, family)
+        if signals is None:
+            continue
+        seen = agreement(draft.signals("position"), signals, draft.sample_time_s)
+        unit = _by_velocity(seen, velocity.meaning.unit)
+        if unit is not None:
+            return unit, (
+                f"{unit}, as {velocity.label} is {seen.ratio:.4g} times the derivative "
+                f"(correlation {seen.alike:.3f})"
+            )
+    return None
+
+
+def _by_targets(draft: Draft) -> tuple[str, str] | None:
+    """Return the unit in which the positions follow targets that name theirs, and the reason; None without one."""
+    for target in of_quantity(draft.families, "position", wanted=True):
+        signals, named = target.of(draft.axes), target.meaning.unit
+        if signals is None or named not in _POSITION_UNITS:
+            continue
+        for unit in _POSITION_UNITS:
+            factors = [si_factor(unit) / si_factor(named)] * len(signals)
+            if followed(draft.signals("position"), signals, factors):
+                return unit, f"{unit}, as the positions follow {target.label}, which is in {named}"
+    return None
 
 
 def _by_velocity(seen: Agreement, velocity_unit: str | None) -> str | None:
@@ -168,7 +191,8 @@ def _by_size(draft: Draft, family: Family) -> tuple[str, str]:
     motor = family.meaning.side == "motor"
     if size <= LARGEST_JOINT_DEG and not motor:
         draft.doubts.append(
-            f"position: deg by size ({size:.4g}, too much for joints in rad); motors in rad would be as large"
+            f"position: deg by size ({size:.3g}), doubtful: in rad a joint turns {size / (2 * math.pi):.2g} "
+            f"times, or it is a motor"
         )
         return "deg", f"deg by size: up to {size:.4g}, too much for a joint in rad"
     draft.doubts.append(f"position: rad of motors by size ({size:.4g}); counts would be as large")

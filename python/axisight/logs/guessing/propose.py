@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
 
 from axisight.errors import LogError
 from axisight.logs.columns import CsvOptions
@@ -28,7 +31,9 @@ from axisight.logs.guessing.uneven import uneven_text
 from axisight.logs.guessing.write import text_of
 from axisight.logs.lazy import LazyArrays
 from axisight.logs.map_files import AnyMap, named_map_text, parse_column_map
-from axisight.logs.sources import load_arrays
+from axisight.logs.sources import load_arrays, suffix_of
+from axisight.logs.sources_csv import header_line
+from axisight.logs.stamps import are_dates, seconds_from_first
 from axisight.robot import Robot
 
 _NATIVE = ({"time_s", "position_1", "torque_cmd_1"}, {"time_s", "position_1", "position_ref_1"})
@@ -78,9 +83,10 @@ def guess_columns(path: Path | str, robot: Robot | None = None) -> Proposal:
     """
     path = Path(path)
     opened, csv = _opened(path)
-    arrays, unread = opened.readable()
+    found, unread = opened.readable()
+    arrays = {name: _without_dates(values) for name, values in found.items()}
     if any(native <= set(arrays) for native in _NATIVE):
-        return _native(path, opened)
+        return _native(path, LazyArrays.of(arrays))
     fit, against = named_map(arrays, robot, path)
     if fit is not None:
         return _named(path, fit)
@@ -133,10 +139,10 @@ def _named(path: Path, fit: Fit) -> Proposal:
 
 def _opened(path: Path) -> tuple[LazyArrays, CsvOptions]:
     """Return the arrays of a file and the CSV options found; the default options for other formats."""
-    if path.suffix.lower() != ".csv":
+    if suffix_of(path).removesuffix(".gz") not in {".csv", ".tsv"}:
         return load_arrays(path), CsvOptions()
     arrays = load_arrays(path, CsvOptions(separator="auto"))
-    if len(load_header(path, ",")) == len(arrays):
+    if len(header_line(path).split(",")) == len(arrays):
         return arrays, CsvOptions()
     numbers = [values.dtype.kind in "iuf" for values in arrays.readable()[0].values()]
     comma = CsvOptions(separator="auto", decimal=",")
@@ -147,10 +153,12 @@ def _opened(path: Path) -> tuple[LazyArrays, CsvOptions]:
     )
 
 
-def load_header(path: Path, separator: str) -> list[str]:
-    """Return the names in the first line of a CSV."""
-    with path.open(encoding="utf-8") as file:
-        return file.readline().split(separator)
+def _without_dates(values: NDArray[Any]) -> NDArray[Any]:
+    """Return dates as seconds from the first; other values, and dates that are not all readable, as they are."""
+    try:
+        return seconds_from_first(values) if are_dates(values) else values
+    except LogError:
+        return values
 
 
 def _leave_rest(draft: Draft) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from axisight.logs.guessing.draft import Draft
 from axisight.logs.guessing.families import Family, of_quantity
 from axisight.logs.guessing.series import Series
-from axisight.logs.units import POSITION_UNITS
+from axisight.logs.units import POSITION_UNITS, si_factor
 
 # Slope and correlation of the measured signal on its target from which on it follows the target.
 _FOLLOWED = (0.8, 1.25)
@@ -45,8 +45,13 @@ def _take(draft: Draft, family: Family) -> None:
     if not family.meaning.quantity:
         why += ", no name says of what it is a target"
         draft.doubts.append(f"position_ref: {why}")
-    units = [unit for _, unit in draft.fields["position"]]
-    draft.take("position_ref", _signals(draft, family), units, why)
+    draft.take("position_ref", _signals(draft, family), _units(draft, family), why)
+
+
+def _units(draft: Draft, family: Family) -> list[str]:
+    """Return the units of targets, one per axis: that of their name, else those of the positions."""
+    named = family.meaning.unit if family.meaning.unit in POSITION_UNITS else None
+    return [named or unit for _, unit in draft.fields["position"]]
 
 
 def _leave(draft: Draft, named: list[Family], bare: list[Family]) -> None:
@@ -74,9 +79,8 @@ def _leave(draft: Draft, named: list[Family], bare: list[Family]) -> None:
 def _offer(draft: Draft, families: list[Family]) -> None:
     """Offer targets to the user, in the unit of their name, else in that of the positions."""
     for family in families:
-        named = family.meaning.unit if family.meaning.unit in POSITION_UNITS else None
-        units = [named or unit for _, unit in draft.fields["position"]]
-        draft.targets.append(list(zip(_signals(draft, family), units, strict=True)))
+        signals = _signals(draft, family)
+        draft.targets.append(list(zip(signals, _units(draft, family), strict=True)))
 
 
 def _signals(draft: Draft, family: Family) -> list[Series]:
@@ -95,17 +99,24 @@ def _leads(draft: Draft, target: Family, quantity: str) -> bool:
     """Whether the measured quantity of all axes follows a target in the unit of that quantity."""
     targets = _signals(draft, target)
     if quantity == "position":
-        return _followed(draft.signals("position"), targets)
+        measured_units = [unit for _, unit in draft.fields["position"]]
+        pairs = zip(measured_units, _units(draft, target), strict=True)
+        factors = [si_factor(own) / si_factor(other) for own, other in pairs]
+        return followed(draft.signals("position"), targets, factors)
     measured = [f.of(draft.axes) for f in of_quantity(draft.families, quantity)]
-    return any(signals is not None and _followed(signals, targets) for signals in measured)
+    same = [1.0] * len(targets)
+    return any(signals is not None and followed(signals, targets, same) for signals in measured)
 
 
-def _followed(measured: list[Series], targets: list[Series]) -> bool:
-    """Whether every axis with a moving target follows it by about as much, and at least one target moves."""
+def followed(measured: list[Series], targets: list[Series], factors: list[float]) -> bool:
+    """Whether every axis with a moving target follows it by about as much, and at least one target moves.
+
+    ``factors`` turn the measured values of each axis into the unit of its target.
+    """
     moved = False
-    for done_series, told_series in zip(measured, targets, strict=True):
+    for done_series, told_series, factor in zip(measured, targets, factors, strict=True):
         told = told_series.values - told_series.values.mean()
-        done = done_series.values - done_series.values.mean()
+        done = factor * (done_series.values - done_series.values.mean())
         size, power = float(np.sqrt((told @ told) * (done @ done))), float(told @ told)
         if power == 0.0:
             continue
