@@ -23,8 +23,8 @@ SMALLEST_SEVERITY, TIMES, LEFT_SMALL = 3.0, 4, 0.1
 RUNAWAY = 30.0
 
 
-class UnstableError(ValueError):
-    """The loop of a machine did not stay bounded."""
+class NoMachineError(ValueError):
+    """The loop of a machine did not stay bounded, or its effect does not show."""
 
 
 @dataclass(frozen=True)
@@ -38,16 +38,16 @@ class Runs:
 def run(arm: Arm, laws: list[Law], w_ref: np.ndarray, noise: np.random.Generator | None) -> Loop:
     """Simulate a log by the engine of the arm.
 
-    Raises UnstableError if a torque is not finite.
+    Raises NoMachineError if a torque is not finite.
     """
     engine = import_module(f".{arm.engine}_engine", __package__)
     loop = Loop(arm, laws, w_ref, noise)
     try:
         engine.run(loop)
     except (RuntimeError, OverflowError) as error:
-        raise UnstableError(str(error)) from error
+        raise NoMachineError(str(error)) from error
     if len(loop.torques) != len(w_ref) or not np.isfinite(loop.torques).all():
-        raise UnstableError(f"{len(loop.torques)} of {len(w_ref)} finite samples")
+        raise NoMachineError(f"{len(loop.torques)} of {len(w_ref)} finite samples")
     return loop
 
 
@@ -105,7 +105,7 @@ def effects_of(
 ) -> tuple[list[Withheld], list[list[float]]]:
     """Return drawn effects and their severity, each large enough by itself unless it is left small.
 
-    Raises UnstableError if no size gives a stable machine.
+    Raises NoMachineError if no size gives a stable machine that shows the effect.
     """
     found: list[Withheld] = []
     for number, (name, axis) in enumerate(zip(names, axes, strict=True)):
@@ -115,7 +115,7 @@ def effects_of(
             effect = kind(name).draw(place(arm, axis, nominal, size, rng))
             try:
                 change = severity(arm, nominal, runs(*changed(arm, [effect]), references))
-            except UnstableError:
+            except NoMachineError:
                 if turn == TIMES:
                     raise
                 size /= 3
@@ -123,6 +123,8 @@ def effects_of(
             if effect.simulator is not None or stay or np.max(change) >= SMALLEST_SEVERITY:
                 break
             size *= 2
+        else:
+            raise NoMachineError(f"{name} on axis {axis + 1} does not show: {np.max(change)}")
         found.append(effect)
     whole = runs(*changed(arm, found), references) if len(found) > 1 else None
     return found, severity(arm, nominal, whole) if whole else change
@@ -150,7 +152,7 @@ def make_case(folder: Path, seed: int, number: int, case_kind: str, names: tuple
     noisy = runs(arm, laws, [w_ref for _, _, w_ref in logs], rng)
     peak = max(np.abs(u).max() for u in nominal.torques)
     if max(np.abs(u).max() for u in noisy.torques) > RUNAWAY * peak:
-        raise UnstableError("the torque ran away")
+        raise NoMachineError("the torque ran away")
     write(folder, stated, logs, noisy)
     what = {"nothing": "none", "outside": "outside the library"}
     return {
@@ -180,7 +182,7 @@ def write(folder: Path, stated: Arm, logs, found: Runs) -> None:
 def make(cases: Path, truth: Path, seed: int, count: int) -> None:
     """Write a whole draw; cases that are there already stay.
 
-    A machine that is unstable is drawn again on another arm or axis.
+    A machine that is unstable or does not show its effect is drawn again on another arm or axis.
     """
     truth.mkdir(parents=True, exist_ok=True)
     labels = truth / "labels.json"
@@ -194,10 +196,10 @@ def make(cases: Path, truth: Path, seed: int, count: int) -> None:
                 known[name] = make_case(
                     cases / name, seed, number + 100_000 * again, case_kind, names
                 )
-            except UnstableError:
+            except NoMachineError:
                 continue
             break
         else:
-            raise UnstableError(f"{name}: {names} has no stable machine")
+            raise NoMachineError(f"{name}: {names} has no machine")
         labels.write_text(json.dumps(known, indent=1) + "\n")
         print(f"{name}: {known[name]['effects']} on {known[name]['arm']}", flush=True)
