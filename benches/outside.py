@@ -28,6 +28,8 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from axisight import InputError, effect_info
+
 AXISIGHT = (sys.executable, "-m", "axisight")
 NOTHING, STRANGE = "none", "outside the library"
 
@@ -77,6 +79,22 @@ def label(effect: dict) -> str:
     return effect["effect"] if effect["axis"] is None else f"{effect['effect']}@{effect['axis']}"
 
 
+def compared(effect: dict) -> dict[str, float]:
+    """Return the parameters that the library knows by the same name, amplitudes first.
+
+    The first one is the size that is held against detection limits. Where the file states none, the
+    size counts as zero, so that no limit is said to be broken.
+    """
+    try:
+        known = effect_info(effect["effect"]).parameters
+    except InputError:  # not in the library
+        known = []
+    params = effect.get("params", {})
+    ordered = sorted(known, key=lambda parameter: parameter.role != "amplitude")
+    found = {p.name: params[p.name] for p in ordered if p.name in params}
+    return found or {"not_compared": 0.0}
+
+
 def truth_of(name: str, entry: dict) -> dict:
     """Return the truth of a case as `axisight blind score` reads it.
 
@@ -102,8 +120,7 @@ def truth_of(name: str, entry: dict) -> dict:
         "seed": 0,
         "number": 0,
         "effects": [
-            {"effect": e["effect"], "axis": e["axis"], "parameters": e.get("params", {})}
-            for e in effects
+            {"effect": e["effect"], "axis": e["axis"], "parameters": compared(e)} for e in effects
         ],
         "severity": [max(column) for column in zip(*rows, strict=True)] if rows else [0.0],
     }
