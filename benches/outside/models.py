@@ -1,0 +1,105 @@
+"""The arms: own parameters of common shapes; two elastic ones for Exudyn, two rigid ones for Drake."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arms import Arm, Joint, Link
+
+
+def _link(mass_kg: float, com_m: tuple[float, ...], *inertia_kg_m2: float) -> Link:
+    xx, yy, zz, *mixed = inertia_kg_m2
+    xy, xz, yz = mixed or (0.0, 0.0, 0.0)
+    return Link(
+        mass_kg, np.array(com_m), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=float)
+    )
+
+
+def elastic_handler() -> Arm:
+    """Return a handling arm of three axes: soft gears, an upper arm that twists."""
+    joints = (
+        Joint("column", (0.0, 0.0, 0.35), "z", _link(95.0, (0.05, 0.0, 0.2), 4.0, 4.2, 3.0),
+              2.6e5, 260.0, 1 / 140, 1.1e-3, 1.5e-3),
+        Joint("shoulder", (0.18, 0.0, 0.4), "y", None, 3.1e5, 300.0, 1 / 150, 1.3e-3, 1.8e-3),
+        Joint("upper_arm_twist", (0.0, 0.0, 0.0), "x",
+              _link(60.0, (0.02, 0.05, 0.38), 5.0, 5.2, 0.8), 5.5e5, 420.0),
+        Joint("elbow", (0.0, 0.0, 0.78), "y",
+              _link(55.0, (0.45, -0.04, 0.08), 0.8, 4.5, 4.6, 0.05, -0.1, 0.02),
+              1.4e5, 140.0, 1 / 120, 7e-4, 9e-4),
+    )  # fmt: skip
+    return Arm(
+        "elastic handling arm", "exudyn", 1e-3, joints, "pi_velocity",
+        kp=np.array([0.25, 0.3, 0.16]), ki=np.array([3.0, 3.6, 1.9]), kv=np.zeros(3),
+        noise_std_rad=5e-5, pose_rad=np.array([0.0, 0.25, 0.1]),
+        top_speed_rad_s=np.array([110.0, 90.0, 110.0]),
+    )  # fmt: skip
+
+
+def elastic_reacher() -> Arm:
+    """Return a light arm of two axes in the vertical plane: strain-wave gears, a drive cascade."""
+    joints = (
+        Joint("lift", (0.0, 0.0, 0.2), "y", _link(7.5, (0.0, 0.03, 0.21), 0.16, 0.17, 0.03),
+              1.9e4, 11.0, 1 / 100, 9e-5, 2e-4),
+        Joint("reach", (0.0, 0.0, 0.44), "y", _link(5.2, (0.22, 0.0, 0.03), 0.02, 0.11, 0.11),
+              7.5e3, 4.0, 1 / 80, 5e-5, 1.2e-4),
+    )  # fmt: skip
+    return Arm(
+        "elastic reacher", "exudyn", 1e-3, joints, "cascade",
+        kp=np.array([0.02, 0.0095]), ki=np.array([0.16, 0.075]), kv=np.array([11.0, 12.0]),
+        noise_std_rad=6e-5, pose_rad=np.array([0.4, 0.5]),
+        top_speed_rad_s=np.array([90.0, 90.0]),
+    )  # fmt: skip
+
+
+def rigid_six() -> Arm:
+    """Return a rigid arm of six axes with a 4 kg tool."""
+    joints = (
+        Joint("base", (0.0, 0.0, 0.25), "z", _link(14.0, (0.01, 0.0, 0.06), 0.12, 0.12, 0.08),
+              ratio=1 / 101, motor_inertia=1.4e-4, viscous=4e-4),
+        Joint("shoulder", (0.06, 0.0, 0.14), "y", _link(16.0, (0.0, 0.04, 0.21), 0.42, 0.4, 0.09),
+              ratio=1 / 121, motor_inertia=1.5e-4, viscous=5e-4),
+        Joint("elbow", (0.0, 0.0, 0.46), "y", _link(8.0, (0.1, -0.03, 0.04), 0.05, 0.12, 0.12),
+              ratio=1 / 101, motor_inertia=8e-5, viscous=3e-4),
+        Joint("forearm", (0.2, 0.0, 0.05), "x", _link(4.5, (0.14, 0.0, 0.0), 0.012, 0.05, 0.05),
+              ratio=1 / 80, motor_inertia=3e-5, viscous=1.2e-4),
+        Joint("bend", (0.26, 0.0, 0.0), "y", _link(2.2, (0.04, 0.0, 0.0), 0.005, 0.006, 0.006),
+              ratio=1 / 80, motor_inertia=2.5e-5, viscous=1e-4),
+        Joint("flange", (0.08, 0.0, 0.0), "x",
+              _link(4.0, (0.09, 0.02, 0.03), 0.015, 0.02, 0.018, -0.001, 0.001, 0.0),
+              ratio=1 / 60, motor_inertia=2e-5, viscous=1e-4),
+    )  # fmt: skip
+    return Arm(
+        "rigid six-axis arm", "drake", 2e-3, joints, "pi_velocity",
+        kp=np.array([0.034, 0.032, 0.015, 0.0028, 0.0022, 0.0022]),
+        ki=np.array([0.2, 0.19, 0.09, 0.016, 0.013, 0.013]), kv=np.zeros(6),
+        noise_std_rad=8e-5, pose_rad=np.array([0.1, 0.3, 0.2, 0.0, 0.5, 0.3]),
+        top_speed_rad_s=np.array([80.0, 80.0, 80.0, 80.0, 80.0, 80.0]),
+    )  # fmt: skip
+
+
+def rigid_stacker() -> Arm:
+    """Return a rigid arm of four axes that stacks crates."""
+    joints = (
+        Joint("turn", (0.0, 0.0, 0.5), "z", _link(110.0, (0.1, 0.0, 0.15), 5.0, 6.0, 6.0),
+              ratio=1 / 160, motor_inertia=1.8e-3, viscous=2.5e-3),
+        Joint("lift", (0.25, 0.0, 0.3), "y", _link(75.0, (0.05, 0.0, 0.45), 9.0, 8.5, 1.2),
+              ratio=1 / 190, motor_inertia=1.9e-3, viscous=2.5e-3),
+        Joint("reach", (0.0, 0.0, 0.95), "y", _link(58.0, (0.5, 0.05, 0.0), 1.0, 8.0, 8.2),
+              ratio=1 / 150, motor_inertia=1.3e-3, viscous=2e-3),
+        Joint("wrist", (1.05, 0.0, -0.15), "z", _link(22.0, (0.06, 0.03, -0.12), 0.6, 0.55, 0.5),
+              ratio=1 / 60, motor_inertia=3e-4, viscous=6e-4),
+    )  # fmt: skip
+    return Arm(
+        "rigid stacking arm", "drake", 2e-3, joints, "pi_velocity",
+        kp=np.array([0.35, 0.3, 0.22, 0.03]), ki=np.array([2.1, 1.8, 1.3, 0.18]), kv=np.zeros(4),
+        noise_std_rad=8e-5, pose_rad=np.array([0.0, 0.2, 0.15, 0.4]),
+        top_speed_rad_s=np.array([110.0, 110.0, 110.0, 70.0]),
+    )  # fmt: skip
+
+
+ARMS = {
+    "elastic_handler": elastic_handler,
+    "elastic_reacher": elastic_reacher,
+    "rigid_six": rigid_six,
+    "rigid_stacker": rigid_stacker,
+}
