@@ -18,7 +18,7 @@ from axisight.gap.measure.torque_traces import signals_of
 from axisight.gap.screening.search_round import Progress
 from axisight.gap.search.balanced_values import with_balanced_values
 from axisight.gap.search.reported_torque import with_constants_told
-from axisight.gap.search.search import search
+from axisight.gap.search.search import refitted, search
 from axisight.gap.search.stated_effects import with_scatter_taken
 from axisight.gap.separate.asked import asked_of
 from axisight.gap.separate.waves import ExperimentLimits
@@ -132,7 +132,12 @@ def _diagnosed(
     inputs, view = inputs.compared(chosen)
     if asked is not None:
         asked.check_limits(view)
-    found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
+    baseline = refitted(view.fitter, progress)
+    later = inputs.compared_later(view, baseline, chosen)
+    if later is not inputs:
+        inputs, view = later, later.view(chosen)
+        baseline = refitted(view.fitter, progress)
+    found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress, baseline)
     taken, scatter = with_scatter_taken(inputs.robot, found, chosen)
     if scatter:
         inputs = inputs.with_effects_of(taken, scatter)

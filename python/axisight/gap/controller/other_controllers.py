@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 # Upper end of the compared band [Hz]. Drives filter the torques that they report above.
 _BAND_HZ = 100.0
 # Upper end of that band for slow logs, as a share of the Nyquist frequency; the lower of the two counts.
-_SHARE_OF_NYQUIST = 0.2
+SHARE_OF_NYQUIST = 0.2
 # Smallest error of the stated law, as a share of the torque's variance, that can show another controller.
 _NOTHING = 1e-4
 # Share of the stated law's squared error that another law may leave, in every log.
@@ -60,7 +60,7 @@ class _Piece:
     def __init__(self, robot: Robot, log: Log, axis: int) -> None:
         time = log.sample_time_s
         self._robot, self._axis, self._time = robot, axis, time
-        self._band_hz = min(_BAND_HZ, _SHARE_OF_NYQUIST * 0.5 / time)
+        self._band_hz = min(_BAND_HZ, SHARE_OF_NYQUIST * 0.5 / time)
         self._reference, wanted, self._moved = told_of(robot, log, axis)
         position, speed = (x[:, axis] for x in as_taken(log))
         if is_continuous(robot) and log.velocity_rad_s is not None:

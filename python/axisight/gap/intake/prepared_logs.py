@@ -12,13 +12,16 @@ from axisight.gap.facts.compared_quantity import Compared
 from axisight.gap.facts.faults import Finding
 from axisight.gap.facts.result import Interval, Reproduction
 from axisight.gap.facts.settings import Settings
+from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.gate import pass_gate, pass_gate_by_targets
 from axisight.gap.intake import user_simulator
-from axisight.gap.intake.start_of_logs import from_rest
+from axisight.gap.intake.start_of_logs import from_rest, loops_of
 from axisight.gap.prepare.currents import Nominal, in_torques
 from axisight.gap.prepare.held_commands import HeldCommands, held_commands, where_they_act
 from axisight.gap.prepare.position_targets import Commanded, with_commands
 from axisight.gap.prepare.reconstructed_references import SAYS, with_references
+from axisight.gap.prepare.start_elsewhere import begins_elsewhere, compared_later
+from axisight.gap.prepare.start_elsewhere import said as begins_elsewhere_said
 from axisight.gap.prepare.stiff_bristles import with_bristles_followed
 from axisight.gap.simulator.own_parameters import constant_name
 from axisight.gap.simulator.start_poses import SAYS as FROM_OWN_POSES
@@ -101,6 +104,25 @@ class PreparedLogs:
             commanded=commanded,
             simulator=found,
         )
+
+    def compared_later(self, view: View, baseline: FittedModel, settings: Settings) -> PreparedLogs:
+        """Return the same with logs that are compared later where the machine begins elsewhere than the simulation.
+
+        ``baseline``: the re-fitted simulator. The logs stay unchanged by inverse dynamics, and where positions or the
+        user's own simulator are compared.
+        """
+        torques = view.mode == "closed_loop" and self.commanded is None and not self.beside
+        floor = view.floor.expected[baseline.axis] * baseline.samples
+        if not torques or not begins_elsewhere(
+            self.robot, self.estimation, baseline, floor, settings
+        ):
+            return self
+        logs = compared_later(loops_of(self.robot), [*self.estimation, *self.validation])
+        if logs is None:
+            return self
+        n = len(self.estimation)
+        noted = (*self.noted, begins_elsewhere_said(logs))
+        return replace(self, estimation=logs[:n], validation=logs[n:], noted=noted)
 
     def with_effects_of(self, robot: Robot, why: Sequence[Finding]) -> PreparedLogs:
         """Return the same with a simulator that states its effects differently, and the findings about that."""

@@ -79,6 +79,11 @@ def from_rest(
     return _replaced(given, parts)
 
 
+def loops_of(robot: Robot) -> tuple[Robot, Robot]:
+    """Return the robot with its own controller, and with the one that keeps a simulation on a log."""
+    return robot, with_integral(robot).with_controller_speed(TRACKING_SPEED)
+
+
 def _moving(run_ups: _RunUps, logs: list[Log], *, simulates: bool) -> list[bool]:
     """Return whether each log starts in motion; where positions leave that open, torques decide.
 
@@ -129,8 +134,7 @@ class _RunUps:
         for fault in flagged(check_log_alone(log), self.despite):
             if fault.severity == "refuse":
                 raise NotRunUpError(f"{log.name}: {fault.name} in {fault.field}")
-        kept = with_integral(self.robot).with_controller_speed(TRACKING_SPEED)
-        return run_up_to(self.robot, (self.robot, kept), log)
+        return run_up_to(self.robot, loops_of(self.robot), log)
 
     def rest(self, logs: Sequence[Log]) -> bool:
         """Whether the first torques of all logs are from rest; False where they cannot be simulated."""

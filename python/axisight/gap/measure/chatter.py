@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import effect_info
+from axisight.gap.facts.axis_names import at_floor
 from axisight.gap.facts.compared_quantity import torque_of
 from axisight.gap.facts.simulator_variant import Variant
 from axisight.gap.facts.wording import percent
@@ -25,15 +26,10 @@ from axisight.logs import Log
 
 Array = NDArray[np.float64]
 
-# Smallest ratio of mean squares: of the gap with the causes to the floor before chatter is considered, and of a
-# chattering machine's noise to that floor.
-_ABOVE = 1.1
 # Simulators with scattered numbers. A course that one in four takes is then seen by 90 %.
 _DRAWS = 8
 # Scatter of their numbers, as a share of the error of formulas.
 _SCATTER = 0.1
-# Purpose of their random numbers, so that no other use of the seed draws the same.
-_PURPOSE = 0x63686172
 # Share of the explainable error that the causes must remove if the simulator is kept on the validation logs. There it
 # cannot drift onto another course, so chatter explains nothing.
 _FOLLOWED = 0.95
@@ -58,11 +54,11 @@ def with_chance(
 
     ``measure``: returns the stage of torque errors (n, n_axes) [Nm] of each log.
     """
-    least = _ABOVE * stages.floor.mean()
-    if not causes.effects or stages.after.mean() <= least:
+    floor = float(np.sqrt(stages.floor.mean()))
+    if not causes.effects or at_floor(float(np.sqrt(stages.after.mean())), floor):
         return stages
     runs = _apart(view, logs, causes, measure)
-    if not least < runs.mean() < stages.refitted.mean():
+    if not runs.mean() < stages.refitted.mean() or at_floor(float(np.sqrt(runs.mean())), floor):
         return stages
     return replace(stages, floor=runs) if view.followed(found, logs) >= _FOLLOWED else stages
 
@@ -78,7 +74,7 @@ def _apart(
     noise = measure(view.noises(logs, len(view.logs), causes))
     here, settings = view.torques(causes, logs), view.settings
     scatter = _SCATTER * settings.model_error
-    drawn = [_scattered(causes, scatter, [settings.seed, _PURPOSE, k]) for k in range(_DRAWS)]
+    drawn = [_scattered(causes, scatter, [settings.seed, k]) for k in range(_DRAWS)]
     with ThreadPoolExecutor(settings.threads) as pool:
         others = pool.map(lambda variant: view.torques(variant, logs), drawn)
         moved = [measure([b - a for a, b in zip(here, x, strict=True)]) for x in others]

@@ -34,7 +34,7 @@ _FADED = 0.8
 # Share of that difference that a log must show to start in motion.
 _HALF = 0.5
 # Fewest logs that can tell by a common constant, or by their first samples.
-_SEVERAL = 3
+SEVERAL = 3
 # Smallest noise of a torque, as a share of the arm's largest torque scatter.
 _NOISELESS = 1e-3
 
@@ -102,7 +102,7 @@ def torques_are_from_rest(robot: Robot, logs: Sequence[Log]) -> bool:
         return False
     if all(_is_noise(x) for x in missed):
         return True
-    if len(logs) < _SEVERAL or not _differ(robot, logs):
+    if len(logs) < SEVERAL or not differ(robot, logs):
         return False
     usual = np.median([x.mean(axis=0) for x in missed], axis=0)
     alike = all(_is_noise(x - usual) for x in missed)
@@ -126,7 +126,7 @@ def _first_missed(robot: Robot, log: Log) -> Array:
     return np.where(_moving_axes(log), (log.torque_nm[:n] - resting) / _noise_nm(log), 0.0)
 
 
-def _differ(robot: Robot, logs: Sequence[Log]) -> bool:
+def differ(robot: Robot, logs: Sequence[Log]) -> bool:
     """Whether logs begin at one pose with different references."""
     poses = np.array([log.position_rad[0] for log in logs]) * robot.gear_ratio
     led = [log.velocity_ref_rad_s for log in logs if log.velocity_ref_rad_s is not None]

@@ -166,6 +166,15 @@ def _run_up(robot: Robot, log: Log, position: Array, references: Array, start_ra
     return made.less(next_position - position, torque[-1] - next_torque)
 
 
+def compared_after_start(loops: Sequence[Robot], log: Log) -> Log:
+    """Return a log from rest that is compared only where the ``loops`` have forgotten an error of its start.
+
+    The part before it is the run-up. Raises NotRunUpError if too little is left, or if a loop does not settle.
+    """
+    pose = loops[0].operating_point if log.start_rad is None else log.start_rad
+    return _cut_after(log, _burn_in_s(log, min(slowest_decay_1_s(r, pose) for r in loops), 1))
+
+
 def _cut_after(log: Log, burn_s: float) -> Log:
     """Return a log from ``burn_s`` [s] on; the part before it is added to the run-up."""
     rest = log.part(burn_s)

@@ -41,15 +41,14 @@ def search(
     expected: Array,
     settings: Settings,
     progress: Progress,
+    baseline: FittedModel | None = None,
 ) -> SearchState:
     """Search for the causes of a gap.
 
     ``candidates``: makes the hypotheses from the residual of a model; ``expected`` (n_axes,): mean square of the
-    weighted residual of noise alone.
+    weighted residual of noise alone. ``baseline``: the re-fitted simulator, if it is there already.
     """
-    progress("re-fitting the simulator", 0, 1)
-    baseline = _refitted(fitter)
-    progress("re-fitting the simulator", 1, 1)
+    baseline = baseline or refitted(fitter, progress)
     floor = expected[baseline.axis] * baseline.samples
     out = SearchState(baseline, baseline, floor, layout_of(baseline), adds_up=fitter.adds_up)
     refused: set[str] = set()
@@ -100,12 +99,16 @@ def search(
     return out
 
 
-def _refitted(fitter: ModelFitter) -> FittedModel:
+def refitted(fitter: ModelFitter, progress: Progress) -> FittedModel:
     """Return the re-fitted simulator without effects. The first halves of the logs are fitted first, for speed."""
+    progress("re-fitting the simulator", 0, 1)
     halves = fitter.beginnings()
     if halves is None:
-        return must_hold(fitter.fit([], refreshes=1))
-    return must_hold(fitter.fit([], must_hold(halves.fit([]))))
+        out = must_hold(fitter.fit([], refreshes=1))
+    else:
+        out = must_hold(fitter.fit([], must_hold(halves.fit([]))))
+    progress("re-fitting the simulator", 1, 1)
+    return out
 
 
 def _judged(

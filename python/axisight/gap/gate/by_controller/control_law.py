@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.controller.feedback import as_taken, before, feedback, free_of_limits
+from axisight.gap.controller.other_controllers import SHARE_OF_NYQUIST
 from axisight.logs import Log, lowpass
 from axisight.robot import Robot
 
@@ -27,8 +28,6 @@ Mask = NDArray[np.bool_]
 
 # Upper end of the compared band [Hz]. Drives filter the torques that they report above.
 _BAND_HZ = 60.0
-# Upper end of that band for slow logs, as a share of the Nyquist frequency; the lower of the two counts.
-_SHARE_OF_NYQUIST = 0.2
 # Samples that are compared in a period of the band's upper end.
 _SAMPLES_PER_BAND = 6
 # Time around a limit that is left out, in periods of the band's upper end: the low-pass smears the limit that
@@ -61,7 +60,7 @@ class ControlLaw:
         reference = log.velocity_ref_rad_s
         assert reference is not None  # closed loop only
         time = log.sample_time_s
-        band = min(_BAND_HZ, _SHARE_OF_NYQUIST * 0.5 / time)
+        band = min(_BAND_HZ, SHARE_OF_NYQUIST * 0.5 / time)
         self.step = max(1, int(1.0 / (time * band * _SAMPLES_PER_BAND)))
         self.sample_time_s = time
         self._band_hz = band

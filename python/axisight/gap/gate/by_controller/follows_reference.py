@@ -22,14 +22,16 @@ Array = NDArray[np.float64]
 
 # Upper end of the compared band [Hz]: loops of arms follow up to some ten hertz.
 _BAND_HZ = 20.0
-# Correlation from which a position follows a reference. An axis at its torque limit for most of a log has 0.94.
-_FOLLOWS = 0.9
-# Range of the ratio of reference to speed that is no finding.
-_SIZE = (0.5, 2.0)
-# Mean square of speed minus reference, relative to the speed's, below which the two are alike.
-_ALIKE = 0.15
+# Correlation from which a position follows a reference or a target. An axis that is at its torque limit for most of a
+# log has 0.94.
+FOLLOWS = 0.9
+# Range of the ratio of reference to speed, or of position to target, that is no finding.
+SIZE = (0.5, 2.0)
+# Mean square of speed minus reference, or of position minus target, relative to that of speed or position, below
+# which the two are alike.
+ALIKE = 0.15
 # The same ratio above which the two are not alike.
-_UNLIKE = 0.5
+UNLIKE = 0.5
 
 
 def check_follows(robot: Robot, log: Log, axes: Sequence[int]) -> list[Finding]:
@@ -48,9 +50,9 @@ def check_follows(robot: Robot, log: Log, axes: Sequence[int]) -> list[Finding]:
             position, np.ascontiguousarray(reference[:, i]), log.sample_time_s
         )
         other = int(np.argmin(left[i]))
-        if left[i, i] > _UNLIKE and left[i, other] < _ALIKE and left[other, i] < _ALIKE:
+        if left[i, i] > UNLIKE and left[i, other] < ALIKE and left[other, i] < ALIKE:
             out.append(_other(log, i, other))
-        elif abs(alike) >= _FOLLOWS and not _SIZE[0] < ratio < _SIZE[1]:
+        elif abs(alike) >= FOLLOWS and not SIZE[0] < ratio < SIZE[1]:
             out += _factor(robot, log, i, ratio)
     return out
 
@@ -75,7 +77,7 @@ def _other(log: Log, i: int, other: int) -> Finding:
 
 def _factor(robot: Robot, log: Log, i: int, ratio: float) -> list[Finding]:
     column = f"position_{i + 1}"
-    if -_SIZE[1] < ratio < -_SIZE[0]:
+    if -SIZE[1] < ratio < -SIZE[0]:
         message = (
             f"expected a position that follows its reference, got one that moves against it (factor {ratio:.4g}). "
             "Change the sign of the position or of the reference"

@@ -6,23 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.facts.faults import Finding
+from axisight.gap.gate.by_controller.follows_reference import ALIKE, FOLLOWS, SIZE, UNLIKE
 from axisight.gap.signals.unit_scales import scale_name
 from axisight.logs import Log
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Correlation from which a position follows a target.
-_FOLLOWS = 0.9
 # Largest delay of a position after its target [s]: loops may be soft.
 _LATE_S = 0.3
-# Range of the ratio of position to target that is no finding.
-_SIZE = (0.5, 2.0)
-# Mean square of position minus target, without means and relative to the position's, below which the two are
-# alike.
-_ALIKE = 0.15
-# The same ratio above which the two are not alike.
-_UNLIKE = 0.5
 
 
 def check_follows_target(robot: Robot, log: Log) -> list[Finding]:
@@ -40,11 +32,11 @@ def check_follows_target(robot: Robot, log: Log) -> list[Finding]:
     for i in range(log.n_axes):
         alike, other = own[best[i], i], int(np.argmin(least[i]))
         size = _size(position[:, i], target[:, i], lags[best[i]])
-        if least[i, i] > _UNLIKE and least[i, other] < _ALIKE and least[other, i] < _ALIKE:
+        if least[i, i] > UNLIKE and least[i, other] < ALIKE and least[other, i] < ALIKE:
             out.append(_other(log, i, other))
-        elif alike <= -_FOLLOWS and _SIZE[0] < -size < _SIZE[1]:
+        elif alike <= -FOLLOWS and SIZE[0] < -size < SIZE[1]:
             out.append(_against(log, i))
-        elif alike >= _FOLLOWS and not _SIZE[0] < size < _SIZE[1]:
+        elif alike >= FOLLOWS and not SIZE[0] < size < SIZE[1]:
             out.append(_factor(robot, log, i, size))
     return out
 
