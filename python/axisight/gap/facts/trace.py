@@ -44,6 +44,7 @@ MOVES: Mapping[str, str] = MappingProxyType(
         "add": "Added the effect that leads an axis and passes all tests of a cause.",
         "drop": "Removed a cause that the other causes make needless, or that imitated an effect of the whole arm.",
         "merge": "Replaced several causes by one effect that explains as much.",
+        "unsure": "Replaced or removed a cause whose size is not sure: its interval includes nothing.",
         "exchange": "Replaced a cause by a rival that is likelier beside the causes found later.",
         "withdraw": "Removed causes that are less likely than none and unknown together.",
         "finish": "Continued the last fit while a step promised a gain above noise.",

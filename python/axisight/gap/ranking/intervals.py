@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,6 +31,22 @@ def intervals(effect: Effect, free: Sequence[str], std: dict[str, float]) -> dic
         low, high = values[name] - spread, values[name] + spread
         out[name] = Interval(values[name], max(low, lower), min(high, upper))
     return out
+
+
+def of_sure_size(
+    effect: Effect, free: Sequence[str], std: dict[str, float], stated: Mapping[str, float]
+) -> bool:
+    """Whether the interval of a fitted amplitude leaves out that the machine has no more than the simulator.
+
+    ``stated``: what the simulator has; nothing by default. True if no amplitude of the effect was fitted.
+    """
+    table = {p.name: p for p in effect_info(effect.name).parameters if p.role == "amplitude"}
+    found = intervals(effect, free, std)
+    return not any(name in found for name in table) or any(
+        not found[name].low <= stated.get(name, p.neutral) <= found[name].high
+        for name, p in table.items()
+        if name in found
+    )
 
 
 def with_own_scatter(

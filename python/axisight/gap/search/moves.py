@@ -18,6 +18,7 @@ from axisight.gap.search.needless import doubtful, needless
 from axisight.gap.search.one_for_several import merged
 from axisight.gap.search.rivals import exchanged
 from axisight.gap.search.state import OPEN, Round, SearchState
+from axisight.gap.search.unsure_size import unsure
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class Move:
 DROP = Move("drop", needless)
 AFTER_EACH_ROUND = (DROP, Move("merge", merged))
 AT_THE_END = (
+    Move("unsure", unsure, then=(DROP,)),
     Move("exchange", exchanged, in_loops_only=True, then=(DROP,)),
     Move("withdraw", doubtful, in_loops_only=True),
 )

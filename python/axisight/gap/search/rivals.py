@@ -11,7 +11,7 @@ from axisight.gap.search.contest import Alternative, Context, Proposal
 from axisight.gap.search.state import alike
 
 # Most rivals of one cause that are tried.
-_RIVALS = 3
+RIVALS = 3
 # Share of the cause's score that a rival needs if the cause was judged beside one that went out.
 _NEARLY = 0.8
 
@@ -36,7 +36,7 @@ def exchanged(context: Context) -> Iterator[Proposal]:
             Alternative(r.trial.fitted.free[-1], r.trial.fitted if alone else state.model)
             for r in rivals
             if r.trial.label not in final
-        )[:_RIVALS]
+        )[:RIVALS]
         if instead:
             mine = next(f for f in state.model.free if f.effect.label == cause.trial.label)
             yield Proposal(standing.axis, (mine,), instead)

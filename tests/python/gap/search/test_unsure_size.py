@@ -1,0 +1,80 @@
+"""A cause whose interval includes nothing is replaced or removed, however likely it is."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from axisight import Effect, Settings
+from axisight.fitting.divergence import must_hold
+from axisight.gap.fit.data_blocks import layout_of
+from axisight.gap.fit.fitted_model import Hypothesis
+from axisight.gap.ranking.intervals import of_sure_size
+from axisight.gap.search.contest import Context, decided
+from axisight.gap.search.state import SearchState
+from axisight.gap.search.unsure_size import size_is_sure, unsure
+from axisight.gap.views.closed_loop import ClosedLoopView
+from gap_data import PLAN, bare_axis, logs_of
+
+WAVE = Effect("torque_ripple", 1, {"order_1": 6, "cosine_1_nm": 0.1, "sine_1_nm": 0.02})
+FRICTION = Effect("coulomb_friction", 1, {"coulomb_nm": 0.4, "smoothing_rad_s": 0.1})
+
+
+@pytest.mark.parametrize(
+    ("effect", "free", "std", "stated", "sure"),
+    [
+        (FRICTION, ("coulomb_nm",), {"coulomb_nm": 0.1}, {}, True),
+        (FRICTION, ("coulomb_nm",), {"coulomb_nm": 0.25}, {}, False),
+        # What the simulator has already is nothing new.
+        (FRICTION, ("coulomb_nm",), {"coulomb_nm": 0.1}, {"coulomb_nm": 0.35}, False),
+        # One wave that is sure on either side is sure.
+        (WAVE, ("cosine_1_nm", "sine_1_nm"), {"cosine_1_nm": 0.01, "sine_1_nm": 0.1}, {}, True),
+        (WAVE, ("cosine_1_nm", "sine_1_nm"), {"cosine_1_nm": 0.1, "sine_1_nm": 0.1}, {}, False),
+        # Without a fitted amplitude there is nothing to be unsure of.
+        (FRICTION, ("smoothing_rad_s",), {"smoothing_rad_s": 9.0}, {}, True),
+    ],
+)
+def test_sizes(effect, free, std, stated, sure):
+    assert of_sure_size(effect, free, std, stated) is sure
+
+
+@pytest.fixture(scope="module")
+def searched() -> tuple[Context, SearchState]:
+    """A model with friction that the machine has, and with a ripple that it lacks and that noise makes."""
+    view = ClosedLoopView(bare_axis(), logs_of(bare_axis(), [FRICTION], PLAN), Settings(threads=1))
+    baseline = must_hold(view.fitter.fit([]))
+    free = [
+        Hypothesis(FRICTION, ("coulomb_nm",)),
+        Hypothesis(WAVE, ("cosine_1_nm", "sine_1_nm")),
+    ]
+    model = must_hold(view.fitter.fit(free, baseline))
+    floor = view.floor.expected[baseline.axis] * baseline.samples
+    state = SearchState(baseline, model, floor, layout_of(baseline))
+    return Context(view.fitter, state, view.settings), state
+
+
+def test_only_the_one_that_noise_makes_is_unsure(searched):
+    _, state = searched
+    assert size_is_sure(state.model, 0)
+    assert not size_is_sure(state.model, 1)
+
+
+def test_it_goes_out_and_the_other_stays(searched, monkeypatch):
+    context, state = searched
+    # Which posteriors led to the causes does not matter here.
+    entered = [(of_trial(f.effect.label), of_axis()) for f in state.model.free]
+    monkeypatch.setattr(SearchState, "accepted", property(lambda _: entered))
+    (proposal,) = unsure(context)
+    assert proposal.labels == {"torque_ripple@1"} and proposal.never_stays
+    decision = decided(context, proposal)
+    assert decision is not None and decision.standing is None
+    assert [f.effect.label for f in decision.model.free] == ["coulomb_friction@1"]
+
+
+def of_trial(label: str):
+    return SimpleNamespace(trial=SimpleNamespace(label=label))
+
+
+def of_axis():
+    return SimpleNamespace(axis=0, ranked=())
