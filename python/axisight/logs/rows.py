@@ -15,6 +15,8 @@ from axisight.logs.recorded import RecordedRows
 
 # Shortest time between two stamps that counts, in usual steps.
 _SHORTEST = 0.1
+# How far uneven stamps may be off, in steps: a reading that is a step old, with half a step of jitter.
+_STAMPS_LATE = 1.5
 
 
 def check_rows(
@@ -25,10 +27,20 @@ def check_rows(
     `signals` are finite and (n,) each, by field (`position`, `torque`, `velocity`, ...) and axis
     from 0; `labels` name their columns. References are not checked, because they may take any form.
     """
+    return _findings(signals, labels, sample_time_s)
+
+
+def _findings(
+    signals: Mapping[Channel, Floats],
+    labels: Mapping[Channel, str],
+    sample_time_s: float,
+    stamps_late: float = 0.0,
+) -> list[Finding]:
+    uneven = stamps_late > 0.0
     return [
         *check_frozen(signals, labels, sample_time_s),
-        *check_repeated_rows(signals, labels, sample_time_s),
-        *check_jumps(signals, labels, sample_time_s),
+        *check_repeated_rows(signals, labels, sample_time_s, uneven=uneven),
+        *check_jumps(signals, labels, sample_time_s, stamps_late=stamps_late),
     ]
 
 
@@ -36,7 +48,8 @@ def check_recorded(rows: RecordedRows) -> list[Finding]:
     """Return findings as `check_rows` about rows with uneven stamps; times count rows at the usual step.
 
     Steps of positions count as if they had taken the usual time, so that a late stamp, or a row that the stamps show
-    to be missing, makes no jump.
+    to be missing, makes no jump. A reader that is not in step with its source reads some rows twice and skips others:
+    its stamps may be a step off.
     """
     if len(rows.stamps_s) < 2:
         return []
@@ -48,7 +61,7 @@ def check_recorded(rows: RecordedRows) -> list[Finding]:
         channel: _paced(values, factor) if channel[0] == "position" else values
         for channel, values in rows.signals.items()
     }
-    return check_rows(signals, rows.labels, usual_s)
+    return _findings(signals, rows.labels, usual_s, _STAMPS_LATE)
 
 
 def _paced(values: Floats, factor: Floats) -> Floats:
