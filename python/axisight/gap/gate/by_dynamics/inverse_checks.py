@@ -100,10 +100,16 @@ def _most_likely(robot: Robot, at: Motion, given: TorqueFit) -> Mistake | None:
     best = min(sound, key=lambda mistake: mistake.fit.total, default=None)
     if best is None:
         return None
-    removed = given.total - best.fit.total
-    axes = list(best.axes)
-    explains = float(best.fit.left[axes].max()) < EXPLAINED
-    enough = removed > max(_REMOVED * given.total, _LEAST_REMOVED)
+    # An axis on which the prediction shows neither way says nothing.
+    tells = (given.gain > _CARRIES) | (best.fit.gain > _CARRIES)
+    before, after = (float(fit.left[tells].sum()) for fit in (given, best.fit))
+    left = best.fit.left[[axis for axis in best.axes if tells[axis]]]
+    if not left.size:
+        return None
+    # A mistake of the whole machine is judged by all its axes together, as one may lack much else.
+    whole = len(best.axes) == robot.n_axes
+    explains = float(left.mean() if whole else left.max()) < EXPLAINED
+    enough = before - after > max(_REMOVED * before, _LEAST_REMOVED)
     return best if enough and explains else None
 
 
