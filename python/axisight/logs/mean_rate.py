@@ -33,8 +33,8 @@ def mean_rate_hz(time_s: Floats, where: str) -> float | None:
     if longest > _HOLE * usual:
         raise LogError(
             f"{where}: expected a message every {usual:.4g} s, got a hole of {longest:.4g} s after "
-            f"{time_s[int(np.argmax(steps))]:.6g} s; cut the recording there, or bridge it by a column "
-            f"map with resample_hz"
+            f"{time_s[int(np.argmax(steps))]:.6g} s; cut the recording there, or bridge it by the line "
+            f"resample_hz = {whole_rate(1.0 / mean):.6g} in [time] of a column map"
         )
     # The mean over the whole log, because single late messages hardly change it.
     return whole_rate(1.0 / mean)

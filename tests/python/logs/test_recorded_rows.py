@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from axisight import check_log, read_log
+from axisight.errors import LogError
 from axisight.gap.gate.log_only import check_log_alone
 from axisight.logs.map_files import parse_column_map
+from axisight.logs.mean_rate import mean_rate_hz
 
 MAP = parse_column_map(
     """
@@ -150,3 +152,9 @@ def test_a_reader_out_of_step_with_its_source_is_sound(tmp_path):
     named = {f.name: f.severity for f in check_log(path, MAP).findings if f.name}
     assert "rows_repeated" in named
     assert "error" not in named.values()
+
+
+def test_a_hole_is_told_the_line_that_bridges_it() -> None:
+    time = np.delete(np.arange(N) * 0.01, np.s_[700:720])
+    with pytest.raises(LogError, match=r"resample_hz = 99 in \[time\]"):
+        mean_rate_hz(time + 1e-4 * np.sin(np.arange(len(time))), "run.csv")
