@@ -14,12 +14,11 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight.gap.facts.faults import Finding
+from axisight.gap.gate.by_dynamics.axis_travel import travels
 from axisight.gap.gate.by_dynamics.torque_fit import EXPLAINED, nuisance
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from axisight.gap.signals.motion import Motion
-from axisight.gap.signals.noise import white_std
 from axisight.logs import Log
-from axisight.logs.quality import quantization
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -28,9 +27,6 @@ Array = NDArray[np.float64]
 # log lowers also gives a negative share, as large as the share of gravity that the load adds; 30 % does not reach
 # the limit.
 _DRIVES = -0.5
-# Travel of an axis in steps of its encoder, or standard deviations of its noise, from which its work is known. On
-# an axis that creeps over a few counts, torque and speed agree by chance.
-_TRAVELS = 100.0
 
 
 def check_passive(robot: Robot, logs: Sequence[Log], motions: Sequence[Motion]) -> list[Finding]:
@@ -90,15 +86,8 @@ def _net_work(log: Log, at: Motion, bodies: Array) -> tuple[Array, Array]:
     scale = np.maximum(np.abs(at[3] * at[1]).sum(axis=0), np.abs(bodies * at[1]).sum(axis=0))
     net = ((at[3] - bodies) * at[1]).sum(axis=0)
     seconds = log.duration_s / len(at[1])
-    moves = _travels(log)
+    moves = travels(log)
     return np.where(moves, net, 0.0) * seconds, np.where(moves, scale, 0.0) * seconds
-
-
-def _travels(log: Log) -> NDArray[np.bool_]:
-    """Return which axes travel enough to be judged, (n_axes,)."""
-    steps = [found.step if (found := quantization(x)) else 0.0 for x in log.position_rad.T]
-    fine = np.maximum(steps, white_std(log.position_rad, log.sample_time_s))
-    return np.asarray(np.ptp(log.position_rad, axis=0) > _TRAVELS * fine)
 
 
 def _finding(axis: int, share: float) -> Finding:

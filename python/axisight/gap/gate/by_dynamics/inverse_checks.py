@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.facts.faults import Finding, GateSeverity, refused
+from axisight.gap.gate.by_dynamics.axis_travel import travels
 from axisight.gap.gate.by_dynamics.friction_sign import check_passive
 from axisight.gap.gate.by_dynamics.gravity_share import check_gravity_share
+from axisight.gap.gate.by_dynamics.load_or_rotor import load_or_rotor_explains
 from axisight.gap.gate.by_dynamics.small_errors import check_small_errors
 from axisight.gap.gate.by_dynamics.torque_fit import EXPLAINED, SAME, TorqueFit, torque_fit
 from axisight.gap.gate.by_dynamics.undone_mistakes import Mistake, predict, undone, with_gravity
@@ -56,7 +58,8 @@ def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     # Small errors are those of a model that is right otherwise.
     if refused(out) or without_gravity:
         return out
-    return [*out, *check_small_errors(robot, motions)]
+    moves = np.all([travels(log) for log in logs], axis=0)
+    return [*out, *check_small_errors(robot, motions, moves)]
 
 
 def thinned(log: Log) -> tuple[float, Motion]:
@@ -77,7 +80,7 @@ def _one_log(robot: Robot, log: Log, at: Motion) -> list[Finding]:
         found = _most_likely(robot, at, given)
         if found is not None:
             return [_named(log, found, given)]
-    return _scales(robot, log, given)
+    return _scales(robot, log, at, given)
 
 
 def _too_fast(robot: Robot, log: Log, at: Motion) -> list[Finding]:
@@ -143,7 +146,7 @@ def _named(log: Log, found: Mistake, given: TorqueFit) -> Finding:
     return Finding(found.name, "refuse", message, None if whole else log.name, axis, field)
 
 
-def _scales(robot: Robot, log: Log, given: TorqueFit) -> list[Finding]:
+def _scales(robot: Robot, log: Log, at: Motion, given: TorqueFit) -> list[Finding]:
     """Return findings about torques that are a multiple of the predicted ones."""
     out = []
     known = (given.gain > _CARRIES) & (given.left < EXPLAINED) & (given.slope > 0.0)
@@ -156,6 +159,8 @@ def _scales(robot: Robot, log: Log, given: TorqueFit) -> list[Finding]:
         name = scale_name("torque", slope, float(robot.gear_ratio[axis]))
         a_unit = not (_ONE_AXIS[0] < slope < _ONE_AXIS[1] or name.endswith("_scaled"))
         severity: GateSeverity = "refuse" if everywhere or a_unit else "flag"
+        if severity == "flag" and load_or_rotor_explains(robot, at, axis):
+            continue
         message = (
             f"expected Nm on the motor side, got numbers {slope:.4g} times the predicted torque. State unit, "
             "scale and side of the gear in a column map, or masses and counterbalance in the robot file"

@@ -40,16 +40,21 @@ _REMOVED = 0.05
 _TELLS = 0.1
 
 
-def check_small_errors(robot: Robot, motions: Sequence[tuple[float, Motion]]) -> list[Finding]:
+def check_small_errors(
+    robot: Robot, motions: Sequence[tuple[float, Motion]], moves: NDArray[np.bool_]
+) -> list[Finding]:
     """Return flags about the time of torques, and the time and zero of single axes.
 
-    ``motions``: sample time [s] and low-passed motion of each log; all logs must show an error.
+    ``motions``: sample time [s] and low-passed motion of each log; all logs must show an error. ``moves`` (n_axes,):
+    the axes that travel; the time of another does not show.
     """
     parts = []
     names: list[tuple[str, int]] = []
     for sample_time_s, at in motions:
         base = predict(robot, at)
         names, effects = _effects(robot, sample_time_s, at, base)
+        shown = [k for k, (kind, i) in enumerate(names) if kind != "axis_delayed" or moves[i]]
+        names, effects = [names[k] for k in shown], [effects[k] for k in shown]
         parts.append(_projected(at, base, effects))
     targets = [target for target, _ in parts]
     shared = [kind == "time_shifted" for kind, _ in names]
