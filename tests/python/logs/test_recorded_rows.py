@@ -156,5 +156,5 @@ def test_a_reader_out_of_step_with_its_source_is_sound(tmp_path):
 
 def test_a_hole_is_told_the_line_that_bridges_it() -> None:
     time = np.delete(np.arange(N) * 0.01, np.s_[700:720])
-    with pytest.raises(LogError, match=r"resample_hz = 99 in \[time\]"):
+    with pytest.raises(LogError, match=r"resample_hz = 100 in \[time\]"):
         mean_rate_hz(time + 1e-4 * np.sin(np.arange(len(time))), "run.csv")

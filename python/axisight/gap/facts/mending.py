@@ -23,8 +23,8 @@ _LINE = {
     "torque_joint_side": 'column map: side = "joint"',
     "gravity_flipped": "robot file: gravity with the other sign",
     "torque_without_gravity": "robot file: gravity = [0.0, 0.0, 0.0]",
-    "time_in_ms": 'column map, [time]: unit = "ms"',
-    "time_in_us": 'column map, [time]: unit = "us"',
+    "time_in_ms": 'column map, time: unit = "ms"',
+    "time_in_us": 'column map, time: unit = "us"',
 }
 # Name of a channel in a column map by the stem of its native column.
 _STEMS = {"torque_cmd": "torque", "position": "position", "velocity_ref": "velocity_ref"}
@@ -40,5 +40,5 @@ def mending_line(name: str, axis: int | None, field: str) -> str | None:
     stem = field.rstrip("0123456789").rstrip("_")
     if name not in _CHANNEL or stem not in _STEMS:
         return None
-    where = "every [[axis]]" if axis is None else f"[[axis]] {axis}"
+    where = "every axis" if axis is None else f"axis {axis}"
     return f"column map, {where}: {_STEMS[stem]} = {{ ..., {_CHANNEL[name]} }}"

@@ -53,7 +53,7 @@ def test_the_message_has_a_line_for_each_fault_and_what_mends_it() -> None:
         "samples_frozen",
         "sign_flipped",
     ]
-    assert "  column map, [[axis]] 3: torque = { ..., sign = -1 }" in lines
+    assert "  column map, axis 3: torque = { ..., sign = -1 }" in lines
     # The same fault of several logs is one line.
     assert "(also in " in str(error.value)
 
@@ -75,9 +75,9 @@ def test_lines_for_a_column_map_are_ones_that_it_takes(name: str) -> None:
     field = name.partition("_in_")[0].partition("_joint_side")[0]
     column = {"torque": "torque_cmd"}.get(field, field) if name != "sign_flipped" else "torque_cmd"
     line = mending_line(name, 1, f"{column}_1")
-    if line is None or not line.startswith("column map, [[axis]] 1: "):
+    if line is None or not line.startswith("column map, axis 1: "):
         return
-    stem, _, inner = line.removeprefix("column map, [[axis]] 1: ").partition(" = ")
+    stem, _, inner = line.removeprefix("column map, axis 1: ").partition(" = ")
     keys = inner.strip("{ }").removeprefix("..., ").replace("N", "4096")
     units = {"position": "rad", "torque": "Nm", "velocity_ref": "rad/s"}
     unit = "" if "unit" in keys else f', unit = "{units[stem]}"'
