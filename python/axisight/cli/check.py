@@ -16,10 +16,10 @@ from axisight.cli.suggest import suggestion
 from axisight.errors import InputError, LogError
 from axisight.gap import Finding
 from axisight.gap.facts.faults import refused
-from axisight.gap.facts.mending import mending_line
 from axisight.gap.intake.inputs import read_beside
 from axisight.gap.intake.preview import look_beside
 from axisight.logs import LogReport, check_log, render
+from axisight.logs.mending import mending_line
 from axisight.logs.untrusted import check_log_inside
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from axisight.errors import CaseError, InputError, LogError
-from axisight.gap.facts.mending import mending_line
+from axisight.logs.mending import mending_line
 
 GateSeverity = Literal["refuse", "flag"]
 

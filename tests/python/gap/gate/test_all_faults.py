@@ -9,9 +9,9 @@ import pytest
 
 from axisight.gap import RefusedInputError, check_inputs
 from axisight.gap.facts.faults import MEANINGS, Finding
-from axisight.gap.facts.mending import mending_line
 from axisight.gap.gate import pass_gate
 from axisight.logs.map_files import parse_column_map
+from axisight.logs.mending import mending_line
 from spoiled_cases import Case, clean_arm, each, every
 
 
