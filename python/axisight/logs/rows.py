@@ -15,6 +15,8 @@ from axisight.logs.recorded import RecordedRows
 
 # Shortest time between two stamps that counts, in usual steps.
 _SHORTEST = 0.1
+# Largest travel of an axis that stands, as a share of that of the axis that travels most.
+_STANDS = 0.01
 # How far uneven stamps may be off, in steps: a reading that is a step old, with half a step of jitter.
 _STAMPS_LATE = 1.5
 
@@ -37,11 +39,22 @@ def _findings(
     stamps_late: float = 0.0,
 ) -> list[Finding]:
     uneven = stamps_late > 0.0
+    moving = _of_axes_that_move(signals)
     return [
-        *check_frozen(signals, labels, sample_time_s),
+        *check_frozen(moving, labels, sample_time_s),
         *check_repeated_rows(signals, labels, sample_time_s, uneven=uneven),
-        *check_jumps(signals, labels, sample_time_s, stamps_late=stamps_late),
+        *check_jumps(moving, labels, sample_time_s, stamps_late=stamps_late),
     ]
+
+
+def _of_axes_that_move(signals: Mapping[Channel, Floats]) -> dict[Channel, Floats]:
+    """Return the signals without those of axes that stand beside others that move.
+
+    What shakes an axis that stands, or its encoder, makes jumps and rests that say nothing of the rows.
+    """
+    travel = {axis: float(np.ptp(x)) for (field, axis), x in signals.items() if field == "position"}
+    least = _STANDS * max(travel.values(), default=0.0)
+    return {c: x for c, x in signals.items() if travel.get(c[1], np.inf) > least}
 
 
 def check_recorded(rows: RecordedRows) -> list[Finding]:

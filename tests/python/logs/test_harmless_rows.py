@@ -118,3 +118,18 @@ def test_readings_that_are_late_now_and_then_are_a_warning() -> None:
     named = severities(index)
     assert "rows_repeated" in named
     assert set(named.values()) == {"warning"}
+
+
+def test_an_axis_that_stands_beside_others_is_set_aside() -> None:
+    """Other axes shake it: its encoder jumps."""
+    position = MOTIONS.copy()
+    position[:, 1] = 0.3 + 1e-6 * RNG.normal(size=len(TIME))
+    position[3000:, 1] += 2e-4
+    assert found(position) == {}
+
+
+def test_a_glitch_of_an_axis_that_stands_is_an_error() -> None:
+    position = MOTIONS.copy()
+    position[:, 1] = 0.3 + 1e-6 * RNG.normal(size=len(TIME))
+    position[1000, 1] += 0.5
+    assert found(position) == {"position_spike": "error"}

@@ -95,3 +95,18 @@ def test_a_wrong_scale_stays_one_beside_a_load() -> None:
         return replace(log, torque_nm=log.torque_nm / np.array([1.0, 1.0, 0.3, 1.0, 1.0, 1.0]))
 
     assert named(in_amperes) == {"torque_scaled"}
+
+
+def test_one_axis_says_nothing_of_the_unit_of_all() -> None:
+    """Axis 5 alone shows what the prediction says, eight times as much of it."""
+
+    def alone(seed: int) -> Log:
+        log = along(arm(), seed, lambda position, _: position)
+        rng = np.random.default_rng(seed)
+        torque = rng.normal(size=log.torque_nm.shape)
+        torque[:, 4] = 8.0 * log.torque_nm[:, 4]
+        return replace(log, torque_nm=torque)
+
+    logs = [alone(seed) for seed in range(3)]
+    found = check_inputs(arm(), logs[:2], logs[2:])
+    assert [f for f in found if f.severity == "refuse"] == []

@@ -151,16 +151,16 @@ def _scales(robot: Robot, log: Log, at: Motion, given: TorqueFit) -> list[Findin
     out = []
     known = (given.gain > _CARRIES) & (given.left < EXPLAINED) & (given.slope > 0.0)
     slopes = given.slope[known]
-    everywhere = bool(np.all((slopes < _ALL_AXES[0]) | (slopes > _ALL_AXES[1])))
+    # One axis of an arm says nothing of the unit of all.
+    enough = len(slopes) > 1 or robot.n_axes == 1
+    everywhere = enough and bool(np.all((slopes < _ALL_AXES[0]) | (slopes > _ALL_AXES[1])))
     for axis in np.flatnonzero(known).tolist():
         slope = float(given.slope[axis])
-        if SAME[0] < slope < SAME[1]:
+        if SAME[0] < slope < SAME[1] or load_or_rotor_explains(robot, at, axis):
             continue
         name = scale_name("torque", slope, float(robot.gear_ratio[axis]))
         a_unit = not (_ONE_AXIS[0] < slope < _ONE_AXIS[1] or name.endswith("_scaled"))
         severity: GateSeverity = "refuse" if everywhere or a_unit else "flag"
-        if severity == "flag" and load_or_rotor_explains(robot, at, axis):
-            continue
         message = (
             f"expected Nm on the motor side, got numbers {slope:.4g} times the predicted torque. State unit, "
             "scale and side of the gear in a column map, or masses and counterbalance in the robot file"
