@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from axisight import Log, Robot
+from axisight import Effect, Log, Robot
 from axisight.gap import check_inputs
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from axisight.gap.signals.motion import motion
@@ -110,3 +110,10 @@ def test_one_axis_says_nothing_of_the_unit_of_all() -> None:
     logs = [alone(seed) for seed in range(3)]
     found = check_inputs(arm(), logs[:2], logs[2:])
     assert [f for f in found if f.severity == "refuse"] == []
+
+
+def test_a_load_is_no_encoder_off_its_zero() -> None:
+    """A load beside the axis of the flange turns the torque of the wrist as an offset of its angle does."""
+    load = Effect("payload", None, {"mass_kg": 1.0, "x_m": 0.0, "y_m": 0.0, "z_m": 0.1})
+    loaded = arm().with_effects([load])
+    assert named(lambda seed: along(loaded, seed, lambda position, _: position)) == set()

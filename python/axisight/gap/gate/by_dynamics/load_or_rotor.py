@@ -25,10 +25,18 @@ def load_or_rotor_explains(robot: Robot, at: Motion, axis: int) -> bool:
     bodies = predict(robot, at)
     own = nuisance(at[1][:, axis])
     scaled = np.column_stack([bodies[:, axis], own])
-    loads = [predict(_loaded(robot, place), at)[:, axis] - bodies[:, axis] for place in _PLACES]
+    loads = [load[:, axis] for load in load_torques(robot, at, bodies)]
     lacking = np.column_stack([*loads, at[2][:, axis], own])
     torque = at[3][:, axis]
     return _left(torque - bodies[:, axis], lacking) <= _left(torque, scaled)
+
+
+def load_torques(robot: Robot, at: Motion, bodies: Array) -> list[Array]:
+    """Return the torques (n, n_axes) [Nm] of unit masses on the last link, beside those of the ``bodies``.
+
+    Their sums are, to first order, the torques of all loads.
+    """
+    return [predict(_loaded(robot, place), at) - bodies for place in _PLACES]
 
 
 def _loaded(robot: Robot, place: tuple[float, float, float]) -> Robot:
