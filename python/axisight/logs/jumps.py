@@ -21,8 +21,8 @@ Ints = NDArray[np.int64]
 
 # A speed is compared with the median of seven neighbours. If a log resolves the motion, no drive changes
 # the speed of an axis by three tenths of its top speed within one sample. For coarse logs and for noise,
-# the limit is twenty times the median deviation (13 standard deviations) over the fastest quarter of the steps:
-# at rest the jitter of a clock does not show.
+# the limit is twenty times the median deviation (13 standard deviations). The jitter of a clock shows in the fastest
+# quarter of the steps alone, and moves a reading by less than the top step.
 _NEIGHBOURS = 7
 _SHARE_OF_TOP = 0.3
 _USUAL = 20.0
@@ -129,10 +129,13 @@ def position_jumps(
     usual = scipy.ndimage.median_filter(step, _NEIGHBOURS, mode="nearest")
     off = step - usual
     top = float(np.quantile(np.abs(usual), 0.999))
-    fast = np.abs(usual) >= np.quantile(np.abs(usual), _FASTEST)
-    noise = float(np.median(np.abs(off[fast])))
-    least = max(_SHARE_OF_TOP * top, _USUAL * noise, 1e-9 * np.ptp(values))
-    found = np.flatnonzero(np.abs(off) > np.maximum(least, stamps_late * np.abs(usual)))
+    size = np.abs(usual)
+    noise, jitter = (
+        _USUAL * float(np.median(np.abs(off[size >= np.quantile(size, q)])))
+        for q in (0.0, _FASTEST)
+    )
+    least = max(_SHARE_OF_TOP * top, noise, min(jitter, top), 1e-9 * np.ptp(values))
+    found = np.flatnonzero(np.abs(off) > np.maximum(least, stamps_late * size))
     if known:
         near = np.abs(found[:, None] - np.array(known)[None]).min(axis=1) <= 2
         found = found[~near]

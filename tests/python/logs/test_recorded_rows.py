@@ -60,6 +60,12 @@ def shuffled(rows: np.ndarray) -> np.ndarray:
     return rows
 
 
+def shuffled_for_long(rows: np.ndarray) -> np.ndarray:
+    """A third of the log."""
+    np.random.default_rng(3).shuffle(rows[700:1400, 1:])
+    return rows
+
+
 def repeated(rows: np.ndarray) -> np.ndarray:
     rows[3::4, 1:] = rows[2::4, 1:]
     return rows
@@ -73,7 +79,7 @@ def cut(rows: np.ndarray) -> np.ndarray:
 FAULTS = {
     "position_spike": [spikes, of_two_publishers],
     "samples_frozen": [frozen],
-    "rows_shuffled": [shuffled],
+    "rows_shuffled": [shuffled, shuffled_for_long],
     "rows_repeated": [repeated],
     "rows_missing": [cut],
 }
@@ -142,7 +148,7 @@ def test_a_part_without_the_fault_is_sound(tmp_path):
 def test_a_reader_out_of_step_with_its_source_is_sound(tmp_path):
     """A source of 100 Hz is read at uneven times: some of its rows are read twice, others never."""
     rng = np.random.default_rng(8)
-    read = (np.arange(N) + 0.35) * 0.01 + 0.004 * rng.uniform(-1, 1, N)
+    read = (np.arange(N) + 0.22) * 0.01 + 0.0025 * rng.uniform(-1, 1, N)
     source = recorded()
     ticks = np.clip(np.floor(read / 0.01).astype(int), 0, None)
     rows = np.column_stack([read, source[ticks, 1:]])
