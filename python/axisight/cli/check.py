@@ -19,6 +19,7 @@ from axisight.gap.facts.faults import refused
 from axisight.gap.intake.inputs import read_beside
 from axisight.gap.intake.preview import look_beside
 from axisight.logs import LogReport, check_log, render
+from axisight.logs.mending import mending_line
 from axisight.logs.untrusted import check_log_inside
 
 
@@ -91,6 +92,9 @@ def _fits(
     for finding in beside.findings:
         if not _told(finding, alone):
             say(f"{'refused' if finding.severity == 'refuse' else 'flagged'}: {finding}")
+            mend = mending_line(finding.name, finding.axis, finding.field)
+            if mend is not None:
+                say(f"  {mend}")
     if refused(beside.findings):
         say(f"a diagnosis with {model} would be refused")
         return False

@@ -9,10 +9,11 @@ from typing import Annotated
 import typer
 
 from axisight.cli.common import Force, errors, say
+from axisight.cli.model_options import Base, ModelOptions, Tip
 from axisight.cli.screen import is_output
+from axisight.errors import InputError
 from axisight.logs import MAPS, named_map_text
 from axisight.logs.guessing import Proposal, guess_columns
-from axisight.robot import load_robot
 from axisight.storage import check_targets, write_whole
 
 columns_app = typer.Typer(no_args_is_help=True, add_completion=False)
@@ -56,6 +57,8 @@ def guess_command(
             help="robot.toml, URDF, MJCF or a preset: gives number, names and kinds of axes.",
         ),
     ] = None,
+    base: Base = None,
+    tip: Tip = None,
     force: Force = False,
 ) -> None:
     """Propose a column map from names and numbers, with the reason of every choice beside it."""
@@ -63,15 +66,26 @@ def guess_command(
         out = None if is_output(out) else out
         given = [log, *(Path(x) for x in (robot,) if x)]
         check_targets({"-o": out}, inputs=given, replaces={"-o": ()}, force=force)
-        found = guess_columns(log, None if robot is None else load_robot(robot))
+        options = ModelOptions(base, tip)
+        if robot is None and options.given():
+            raise InputError(
+                f"{', '.join(options.given())}: expected --robot MODEL beside it, got none"
+            )
+        found = guess_columns(log, None if robot is None else options.load(robot))
         if out is None:
             typer.echo(found.text, nl=False)
             return
         write_whole(out, found.text)
-        _say_found(out, log, robot, found)
+        chain = [
+            word
+            for name in ("base", "tip")
+            if (link := getattr(options, name))
+            for word in (f"--{name}", link)
+        ]
+        _say_found(out, log, [] if robot is None else ["--robot", robot, *chain], found)
 
 
-def _say_found(out: Path, log: Path, robot: str | None, found: Proposal) -> None:
+def _say_found(out: Path, log: Path, beside: list[str], found: Proposal) -> None:
     if found.named is None:
         say(f"{out}: a map of its own; look at the reasons in it before use")
     elif found.doubts:
@@ -83,7 +97,7 @@ def _say_found(out: Path, log: Path, robot: str | None, found: Proposal) -> None
     for name, reason in found.unused.items():
         say(f"not used: {name}: {reason}")
     check = ["axisight", "check", str(log), "--columns", str(out)]
-    command = shlex.join(check if robot is None else [*check, "--robot", robot])
+    command = shlex.join([*check, *beside])
     if found.missing is None:
         say(f"then: {command}")
     else:

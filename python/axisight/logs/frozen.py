@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.logs.findings import Finding
+from axisight.logs.findings import Finding, Severity
 from axisight.logs.gather import Channel
+from axisight.logs.harm import LITTLE, deviations, is_harmless
 from axisight.logs.log import Floats
 from axisight.logs.resolution import ROUNDING
 
@@ -27,6 +28,12 @@ _AROUND = 50
 _TRAVEL = 0.05
 # A moving axis makes steps of several resolutions before and after a repeated row.
 _MOVING_STEPS = 5.0
+# Largest share of old readings among rows with uneven stamps that does no harm.
+_OLD_READINGS = 0.1
+SHARE_OF_JUMP = 0.4
+"""Share of a jump from which a step beside it in the same direction makes it part of a motion.
+
+Lost rows, resets, glitches and the motion that a frozen channel missed show in one step alone."""
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:
@@ -35,12 +42,15 @@ def runs(mask: Mask) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def frozen_stretches(values: Floats, *, limited: bool = False) -> list[tuple[int, int]]:
+def frozen_stretches(
+    values: Floats, *, limited: bool = False, smooth: bool = False
+) -> list[tuple[int, int]]:
     """Return (first, last) sample of every stretch over which a channel (n,) is frozen.
 
     A stretch counts if equal neighbours are rare elsewhere and the value jumps at its end by more
     than a sensor at rest would. Stretches at the start and the end of a log count as rest. With `limited`,
-    stretches at the largest and the smallest value count as saturation, not as frozen.
+    stretches at the largest and the smallest value count as saturation, not as frozen. With `smooth`, as for
+    a position, the axis stood where it goes on from the stretch with steps of the same size: it missed no motion.
     """
     step = np.diff(values)
     still = step == 0.0
@@ -60,7 +70,14 @@ def frozen_stretches(values: Floats, *, limited: bool = False) -> list[tuple[int
         for a, b in inner
         if abs(step[b]) > max(least, _RESOLUTIONS * _resolution(step, a, b, rounding))
         and values[a] not in extremes
+        and not (smooth and _starts(step, b))
     ]
+
+
+def _starts(step: Floats, last: int) -> bool:
+    """Whether the steps after the stretch that ends at `last` are those of an axis that starts to move."""
+    after = step[last + 1 : last + 2]
+    return bool(np.any(after * np.sign(step[last]) > SHARE_OF_JUMP * abs(step[last])))
 
 
 def _resolution(step: Floats, first: int, last: int, rounding: float) -> float:
@@ -85,7 +102,7 @@ def check_frozen(
         field, axis = channel
         if field not in ("position", "torque", "velocity"):
             continue
-        found = frozen_stretches(values, limited=field == "torque")
+        found = frozen_stretches(values, limited=field == "torque", smooth=field == "position")
         position = signals.get(("position", axis))
         if field != "position" and position is not None:
             found = [(a, b) for a, b in found if _moves(position, a, b)]
@@ -98,8 +115,23 @@ def check_frozen(
             f"from {first * sample_time_s:.4g} s on{more}, then a jump of "
             f"{abs(values[last + 1] - values[last]):.4g}: the channel stood still; cut the log there"
         )
-        findings.append(Finding("error", labels[channel], message, "samples_frozen", axis + 1))
+        little = field == "position" and _missed_little(values, found, sample_time_s)
+        severity: Severity = "warning" if little else "error"
+        end = LITTLE if little else ""
+        findings.append(
+            Finding(severity, labels[channel], message + end, "samples_frozen", axis + 1)
+        )
     return findings
+
+
+def _missed_little(values: Floats, stretches: list[tuple[int, int]], sample_time_s: float) -> bool:
+    """Whether a position that had moved evenly during its frozen stretches would be nearly the same motion."""
+    step = np.diff(values)
+    wrong = np.zeros_like(step)
+    for first, last in stretches:
+        part = slice(first, last + 1)
+        wrong[part] = step[part] - step[part].mean()
+    return is_harmless(values, wrong, sample_time_s)
 
 
 def _moves(position: Floats, first: int, last: int) -> bool:
@@ -114,10 +146,8 @@ def _moves(position: Floats, first: int, last: int) -> bool:
     return not (steps[0] != 0.0 and np.ptp(steps) <= ROUNDING * float(np.abs(position).max()))
 
 
-def check_repeated_rows(
-    signals: Mapping[Channel, Floats], labels: Mapping[Channel, str], sample_time_s: float
-) -> list[Finding]:
-    """Return a finding if whole rows repeat while an axis moves."""
+def repeated_rows(signals: Mapping[Channel, Floats]) -> list[tuple[int, int]]:
+    """Return (first, one past the last) step of every short run of whole rows that repeat while an axis moves."""
     measured = [v for (field, _), v in signals.items() if field in ("position", "torque")]
     positions = [(c, v) for c, v in signals.items() if c[0] == "position"]
     if not positions or len(measured[0]) < 4:
@@ -130,7 +160,21 @@ def check_repeated_rows(
         if nonzero.size:
             fast = size > _MOVING_STEPS * nonzero.min()
             in_motion |= _touched_on_both_sides(equal, fast)
-    short = [(a, b) for a, b in runs(equal) if b - a < _FROZEN and in_motion[a]]
+    return [(a, b) for a, b in runs(equal) if b - a < _FROZEN and in_motion[a]]
+
+
+def check_repeated_rows(
+    signals: Mapping[Channel, Floats],
+    labels: Mapping[Channel, str],
+    sample_time_s: float,
+    *,
+    uneven: bool = False,
+) -> list[Finding]:
+    """Return a finding if whole rows repeat while an axis moves.
+
+    With stamps that are `uneven`, a row that repeats is an old reading, as late as a stamp may be.
+    """
+    short = repeated_rows(signals)
     if not short:
         return []
     count = sum(b - a for a, b in short)
@@ -139,7 +183,16 @@ def check_repeated_rows(
         f"while the machine moved, first at index {short[0][0] + 1}: rows were given twice; export "
         "the log again, with its own time stamps"
     )
-    return [Finding("error", labels[positions[0][0]], message, "rows_repeated")]
+    positions = [(c, v) for c, v in signals.items() if c[0] == "position"]
+    places = np.concatenate([np.arange(a, b) for a, b in short])
+    little = (
+        count <= _OLD_READINGS * len(positions[0][1])
+        if uneven
+        else all(is_harmless(x, deviations(x, places), sample_time_s) for _, x in positions)
+    )
+    severity: Severity = "warning" if little else "error"
+    end = LITTLE if little else ""
+    return [Finding(severity, labels[positions[0][0]], message + end, "rows_repeated")]
 
 
 def _touched_on_both_sides(equal: Mask, fast: Mask) -> Mask:

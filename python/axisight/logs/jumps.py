@@ -9,9 +9,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from axisight.logs.findings import Finding
-from axisight.logs.frozen import frozen_stretches
+from axisight.logs.findings import Finding, Severity
+from axisight.logs.frozen import SHARE_OF_JUMP, frozen_stretches, repeated_rows
 from axisight.logs.gather import Channel
+from axisight.logs.harm import LITTLE, deviations, is_harmless
 from axisight.logs.log import Floats
 from axisight.logs.resolution import steps_around
 from axisight.logs.spikes import isolated_spikes
@@ -20,20 +21,21 @@ Ints = NDArray[np.int64]
 
 # A speed is compared with the median of seven neighbours. If a log resolves the motion, no drive changes
 # the speed of an axis by three tenths of its top speed within one sample. For coarse logs and for noise,
-# the limit is twenty times the median deviation (13 standard deviations).
+# the limit is twenty times the median deviation (13 standard deviations). The jitter of a clock shows in the fastest
+# quarter of the steps alone, and moves a reading by less than the top step.
 NEIGHBOURS = 7
 _SHARE_OF_TOP = 0.3
 _USUAL = 20.0
+_FASTEST = 0.75
 # On a slow axis, a coarse encoder or numbers with few digits make the speed jump by one or two steps.
 _RESOLUTIONS = 3.0
-# If a neighbouring step deviates in the same direction by this share of the jump, it is a short real motion,
-# as of a wrist near a singular pose. Lost rows, resets and glitches show in one step alone.
-_SHARE_OF_JUMP = 0.4
 # Jumps within so many samples are one event; from four places on, an event means rows out of order.
 _EVENT_SAMPLES = 15
 _OUT_OF_ORDER = 4
 # Relative tolerance of a full turn, for the motion within one sample.
 _TURN_TOLERANCE = 0.05
+# Largest size of a spike, as a share of the step beside it, that is a reading early or late by less than a sample.
+_EARLY_OR_LATE = 0.5
 
 
 @dataclass(frozen=True)
@@ -51,25 +53,35 @@ class Jump:
 
 
 def check_jumps(
-    signals: Mapping[Channel, Floats], labels: Mapping[Channel, str], sample_time_s: float
+    signals: Mapping[Channel, Floats],
+    labels: Mapping[Channel, str],
+    sample_time_s: float,
+    *,
+    stamps_late: float = 0.0,
 ) -> list[Finding]:
     """Return findings about jumps of positions, and about single wrong samples of position and torque.
 
-    `signals` are finite, (n,) each. A jump at the end of a frozen stretch is not reported again.
+    `signals` are finite, (n,) each. A jump at the end of a frozen stretch or of repeated rows is not
+    reported again. `stamps_late`: how
+    far stamps may be off, in steps; the motion in that time is no jump.
     """
     findings = []
     jumps: list[Jump] = []
+    repeated = [end for run in repeated_rows(signals) for end in run]
     tops: dict[int, float] = {}
     for channel, values in signals.items():
         field, axis = channel
         if field not in ("position", "torque"):
             continue
         spikes = isolated_spikes(values)
+        if field == "position":
+            spikes = spikes[_early_or_late(values, spikes) > stamps_late]
         if len(spikes):
             findings.append(_spiked(channel, labels[channel], values, spikes, sample_time_s))
         if field == "position":
-            known = [end for _, end in frozen_stretches(values)]
-            own, tops[axis] = position_jumps(values, axis, [*spikes.tolist(), *known])
+            known = [end for _, end in frozen_stretches(values, smooth=True)]
+            skipped = [*spikes.tolist(), *known, *repeated]
+            own, tops[axis] = position_jumps(values, axis, skipped, stamps_late)
             jumps += own
     return findings + _explained(jumps, tops, signals, labels, sample_time_s)
 
@@ -85,18 +97,45 @@ def _spiked(
         f"{k * sample_time_s:.4g} s by {size:.4g}: replace them by their neighbours' mean, or cut "
         "the log there"
     )
-    severity = "error" if field == "position" else "warning"
-    return Finding(severity, label, message, f"{field}_spike", axis + 1)  # type: ignore[arg-type]
+    if field != "position":
+        return Finding("warning", label, message, "torque_spike", axis + 1)
+    little = _between_neighbours(values, spikes, sample_time_s)
+    severity: Severity = "warning" if little else "error"
+    end = LITTLE if little else ""
+    return Finding(severity, label, message + end, "position_spike", axis + 1)
 
 
-def position_jumps(values: Floats, axis: int, known: list[int]) -> tuple[list[Jump], float]:
-    """Return the jumps of a position (n,) that are not near the samples `known`, and its top step."""
+def _between_neighbours(values: Floats, spikes: Ints, sample_time_s: float) -> bool:
+    """Whether spikes of a position are readings early or late by less than a sample, and do no harm."""
+    within = bool(np.all(_early_or_late(values, spikes) <= _EARLY_OR_LATE))
+    return within and is_harmless(values, deviations(values, spikes), sample_time_s)
+
+
+def _early_or_late(values: Floats, spikes: Ints) -> Floats:
+    """Return how early or late the readings at `spikes` would be [steps], if the position was sound."""
+    off = np.abs(values[spikes] - 0.5 * (values[spikes - 1] + values[spikes + 1]))
+    step = 0.5 * np.abs(values[spikes + 1] - values[spikes - 1])
+    return np.asarray(off / np.maximum(step, 1e-300))
+
+
+def position_jumps(
+    values: Floats, axis: int, known: list[int], stamps_late: float = 0.0
+) -> tuple[list[Jump], float]:
+    """Return the jumps of a position (n,) that are not near the samples `known`, and its top step.
+
+    `stamps_late` as in `check_jumps`.
+    """
     step = np.diff(values)
     usual = scipy.ndimage.median_filter(step, NEIGHBOURS, mode="nearest")
     off = step - usual
     top = float(np.quantile(np.abs(usual), 0.999))
-    least = max(_SHARE_OF_TOP * top, _USUAL * float(np.median(np.abs(off))), 1e-9 * np.ptp(values))
-    found = np.flatnonzero(np.abs(off) > least)
+    size = np.abs(usual)
+    noise, jitter = (
+        _USUAL * float(np.median(np.abs(off[size >= np.quantile(size, q)])))
+        for q in (0.0, _FASTEST)
+    )
+    least = max(_SHARE_OF_TOP * top, noise, min(jitter, top), 1e-9 * np.ptp(values))
+    found = np.flatnonzero(np.abs(off) > np.maximum(least, stamps_late * size))
     if known:
         near = np.abs(found[:, None] - np.array(known)[None]).min(axis=1) <= 2
         found = found[~near]
@@ -110,7 +149,7 @@ def _in_a_motion(off: Floats, found: Ints) -> NDArray[np.bool_]:
     padded = np.pad(off, 1)
     beside = np.stack([padded[found], padded[found + 2]])
     return np.asarray(
-        np.any(beside * np.sign(off[found]) > _SHARE_OF_JUMP * np.abs(off[found]), axis=0)
+        np.any(beside * np.sign(off[found]) > SHARE_OF_JUMP * np.abs(off[found]), axis=0)
     )
 
 
@@ -150,8 +189,25 @@ def _explained(
             f"axis {first.axis + 1})"
         )
         axis = first.axis + 1 if name.startswith("position_") else None
-        findings.append(Finding("error", labels["position", first.axis], message, name, axis))
+        little = _of_little_effect(members, positions, sample_time_s)
+        severity: Severity = "warning" if little else "error"
+        end = LITTLE if little else ""
+        label = labels["position", first.axis]
+        findings.append(Finding(severity, label, message + end, name, axis))
     return findings
+
+
+def _of_little_effect(
+    events: list[list[Jump]], positions: Mapping[int, Floats], sample_time_s: float
+) -> bool:
+    """Whether the jumps of all events do no harm on any axis."""
+    places: dict[int, list[int]] = {}
+    for jump in (j for event in events for j in event):
+        places.setdefault(jump.axis, []).append(jump.index)
+    return all(
+        is_harmless(positions[axis], deviations(positions[axis], np.array(own)), sample_time_s)
+        for axis, own in places.items()
+    )
 
 
 def _wraps(values: Floats, jumps: list[Jump]) -> bool:
@@ -201,7 +257,7 @@ def _there_and_back(jumps: list[Jump]) -> bool:
     """Whether jumps of one axis come in pairs, from one sample to the next, of which the second undoes the first."""
     pairs = list(zip(jumps[::2], jumps[1::2], strict=False))
     return len(jumps) % 2 == 0 and all(
-        b.index == a.index + 1 and abs(a.size + b.size) < _SHARE_OF_JUMP * abs(a.size)
+        b.index == a.index + 1 and abs(a.size + b.size) < SHARE_OF_JUMP * abs(a.size)
         for a, b in pairs
     )
 

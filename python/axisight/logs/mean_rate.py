@@ -13,6 +13,8 @@ from axisight.logs.log import Floats
 _UNIFORM = 0.01
 # A step of this many median steps is a hole, to be bridged only if the user asks for it.
 _HOLE = 5.0
+# Steps below this multiple of the median one are those of messages that are late, not of holes.
+_LATE = 1.5
 
 
 def mean_rate_hz(time_s: Floats, where: str) -> float | None:
@@ -33,11 +35,16 @@ def mean_rate_hz(time_s: Floats, where: str) -> float | None:
     if longest > _HOLE * usual:
         raise LogError(
             f"{where}: expected a message every {usual:.4g} s, got a hole of {longest:.4g} s after "
-            f"{time_s[int(np.argmax(steps))]:.6g} s; cut the recording there, or bridge it by a column "
-            f"map with resample_hz"
+            f"{time_s[int(np.argmax(steps))]:.6g} s; cut the recording there, or bridge it by the line "
+            f"resample_hz = {whole_rate(1.0 / without_holes_s(steps)):.6g} in [time] of a column map"
         )
     # The mean over the whole log, because single late messages hardly change it.
     return whole_rate(1.0 / mean)
+
+
+def without_holes_s(steps_s: Floats) -> float:
+    """Return the mean step [s] of stamps with steps ``steps_s`` (n,) [s] that jitter, holes left out."""
+    return float(steps_s[steps_s < _LATE * np.median(steps_s)].mean())
 
 
 def whole_rate(rate_hz: float) -> float:

@@ -16,6 +16,10 @@ from axisight.logs.recorded import RecordedRows
 
 # Shortest time between two stamps that counts, in usual steps.
 _SHORTEST = 0.1
+# Largest travel of an axis that stands, as a share of that of the axis that travels most.
+_STANDS = 0.01
+# How far uneven stamps may be off, in steps: a reading that is a step old, with half a step of jitter.
+_STAMPS_LATE = 1.5
 
 
 def check_rows(
@@ -26,11 +30,32 @@ def check_rows(
     `signals` are finite and (n,) each, by field (`position`, `torque`, `velocity`, ...) and axis
     from 0; `labels` name their columns. References are not checked, because they may take any form.
     """
+    return _findings(signals, labels, sample_time_s)
+
+
+def _findings(
+    signals: Mapping[Channel, Floats],
+    labels: Mapping[Channel, str],
+    sample_time_s: float,
+    stamps_late: float = 0.0,
+) -> list[Finding]:
+    uneven = stamps_late > 0.0
+    moving = _of_axes_that_move(signals)
     return [
-        *check_frozen(signals, labels, sample_time_s),
-        *check_repeated_rows(signals, labels, sample_time_s),
-        *check_jumps(signals, labels, sample_time_s),
+        *check_frozen(moving, labels, sample_time_s),
+        *check_repeated_rows(signals, labels, sample_time_s, uneven=uneven),
+        *check_jumps(moving, labels, sample_time_s, stamps_late=stamps_late),
     ]
+
+
+def _of_axes_that_move(signals: Mapping[Channel, Floats]) -> dict[Channel, Floats]:
+    """Return the signals without those of axes that stand beside others that move.
+
+    What shakes an axis that stands, or its encoder, makes jumps and rests that say nothing of the rows.
+    """
+    travel = {axis: float(np.ptp(x)) for (field, axis), x in signals.items() if field == "position"}
+    least = _STANDS * max(travel.values(), default=0.0)
+    return {c: x for c, x in signals.items() if travel.get(c[1], np.inf) > least}
 
 
 def check_recorded(rows: RecordedRows) -> list[Finding]:
@@ -39,6 +64,7 @@ def check_recorded(rows: RecordedRows) -> list[Finding]:
     A stamp can be late although its sample was taken in time, and a sample can be late as its stamp says. Therefore
     each step of a position counts as it is or as if it had taken the usual time, whichever is nearer to its
     neighbours: neither a late stamp nor a row that the stamps show to be missing makes a jump.
+    A reader that is not in step with its source reads some rows twice and skips others: its stamps may be a step off.
     """
     if len(rows.stamps_s) < 2:
         return []
@@ -50,7 +76,7 @@ def check_recorded(rows: RecordedRows) -> list[Finding]:
         channel: _paced(values, factor) if channel[0] == "position" else values
         for channel, values in rows.signals.items()
     }
-    return check_rows(signals, rows.labels, usual_s)
+    return _findings(signals, rows.labels, usual_s, _STAMPS_LATE)
 
 
 def _paced(values: Floats, factor: Floats) -> Floats:

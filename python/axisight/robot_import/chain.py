@@ -98,7 +98,7 @@ def _only_end(tree: Tree, first: str) -> str:
         raise RobotError(
             f"{tree.bodies[trunk[-1]].where}: expected one serial chain below {first!r}, got {len(ends)} moving "
             f"branches: give the last link of the one that is meant, --tip (of diagnose, "
-            f"check, explore, simulate, excite and robot import) or "
+            f"check, columns guess, explore, simulate, excite and robot import) or "
             f"tip = '...' in the drive data beside the file (they end at "
             f"{_listed(shown)} and part at {trunk[-1]}); other branches are locked at zero"
         )

@@ -4,6 +4,7 @@ import re
 import shlex
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -12,6 +13,7 @@ from axisight.cli.identify_common import provenance
 from axisight.logs import MAPS, load_column_map, named_map_text
 from axisight.logs.sources import files_of
 from columns_data import maker_columns, robot_toml, write_csv, write_lerobot
+from model_logs import branched, with_load, written_log
 
 
 def run(*arguments: object, code: int = 0) -> str:
@@ -99,3 +101,20 @@ def test_names_of_maps_and_episodes_have_hashes_where_values_come_from(tmp_path)
     found = provenance("axis", [episode], {}, Path("lerobot"))
     assert set(found.data) == {"info.json", "episode_000001.parquet", "lerobot.toml"}
     assert files_of(path) == [path]
+
+
+def test_a_guess_takes_the_tip_of_a_model(tmp_path: Path):
+    model = branched(tmp_path)
+    robot = with_load(model, 0.5)
+    frame = pd.read_parquet(written_log(tmp_path, 0, robot, lambda q, _: 0 * q))
+    names = {c: c.replace("position", "q").replace("torque_cmd", "tau") for c in frame.columns}
+    path = tmp_path / "run.csv"
+    frame.rename(columns={**names, "time_s": "t"}).to_csv(path, index=False)
+    said = run("columns", "guess", path, "--robot", model, code=2)
+    assert "2 moving branches" in said
+    said = run(
+        "columns", "guess", path, "--robot", model, "--tip", "flange", "-o", tmp_path / "map.toml"
+    )
+    assert said.endswith(f"--robot {model} --tip flange")
+    said = run("columns", "guess", path, "--tip", "flange", code=2)
+    assert "--tip: expected --robot MODEL beside it" in said

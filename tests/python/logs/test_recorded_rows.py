@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from axisight import check_log, read_log
+from axisight.errors import LogError
 from axisight.gap.gate.log_only import check_log_alone
 from axisight.logs.map_files import parse_column_map
+from axisight.logs.mean_rate import mean_rate_hz
 
 MAP = parse_column_map(
     """
@@ -58,6 +60,12 @@ def shuffled(rows: np.ndarray) -> np.ndarray:
     return rows
 
 
+def shuffled_for_long(rows: np.ndarray) -> np.ndarray:
+    """A third of the log."""
+    np.random.default_rng(3).shuffle(rows[700:1400, 1:])
+    return rows
+
+
 def repeated(rows: np.ndarray) -> np.ndarray:
     rows[3::4, 1:] = rows[2::4, 1:]
     return rows
@@ -71,7 +79,7 @@ def cut(rows: np.ndarray) -> np.ndarray:
 FAULTS = {
     "position_spike": [spikes, of_two_publishers],
     "samples_frozen": [frozen],
-    "rows_shuffled": [shuffled],
+    "rows_shuffled": [shuffled, shuffled_for_long],
     "rows_repeated": [repeated],
     "rows_missing": [cut],
 }
@@ -121,7 +129,38 @@ def test_late_stamps_are_no_jumps(tmp_path, jitter):
     assert {f.name for f in check_log(path, MAP).findings if f.severity == "error"} == set()
 
 
+def test_a_stamp_that_is_off_makes_no_spike_of_its_reading(tmp_path):
+    """Two stamps are a tenth of a step late; their readings are not."""
+    rows = recorded()
+    even = np.arange(N) * 0.01
+    rows[:, 1] = np.sin(1.1 * even) + 0.4 * np.sin(3.7 * even + 1.0)
+    rows[:, 0] = even + 1e-3 * np.isin(np.arange(N), [600, 1200])
+    path = written(rows, tmp_path / "run.csv")
+    assert {f.name for f in check_log(path, MAP).findings if f.name} == set()
+
+
 def test_a_part_without_the_fault_is_sound(tmp_path):
     log = read_log(written(frozen(recorded()), tmp_path / "run.csv"), MAP)
     assert check_log_alone(log.part(10.0)) == []
     assert [f.name for f in check_log_alone(log.part(0.0, 9.5))] == ["samples_frozen"] * 2
+
+
+def test_a_reader_out_of_step_with_its_source_is_sound(tmp_path):
+    """A source of 100 Hz is read at uneven times: some of its rows are read twice, others never."""
+    rng = np.random.default_rng(8)
+    read = (np.arange(N) + 0.22) * 0.01 + 0.0025 * rng.uniform(-1, 1, N)
+    source = recorded()
+    ticks = np.clip(np.floor(read / 0.01).astype(int), 0, None)
+    rows = np.column_stack([read, source[ticks, 1:]])
+    assert 0.03 < np.mean(np.diff(ticks) == 0) < 0.1
+    rows[:, 0] -= rows[0, 0]
+    path = written(rows, tmp_path / "run.csv")
+    named = {f.name: f.severity for f in check_log(path, MAP).findings if f.name}
+    assert "rows_repeated" in named
+    assert "error" not in named.values()
+
+
+def test_a_hole_is_told_the_line_that_bridges_it() -> None:
+    time = np.delete(np.arange(N) * 0.01, np.s_[700:720])
+    with pytest.raises(LogError, match=r"resample_hz = 100 in \[time\]"):
+        mean_rate_hz(time + 1e-4 * np.sin(np.arange(len(time))), "run.csv")

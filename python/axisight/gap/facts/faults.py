@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from axisight.errors import CaseError, InputError, LogError
+from axisight.logs.mending import mending_line
 
 GateSeverity = Literal["refuse", "flag"]
 
@@ -139,23 +139,37 @@ class Finding:
 
 
 class RefusedInputError(CaseError, LogError):
-    """Simulator or logs cannot be what they claim; ``findings`` has every fault that was found."""
+    """Simulator or logs cannot be what they claim; ``findings`` has every fault that was found.
+
+    The message has one line for each fault, the worst first, with the line that mends it below.
+    """
 
     def __init__(self, findings: tuple[Finding, ...]) -> None:
         self.findings = findings
-        # A scale that nobody knows is often what another fault does: a position in deg scales torques.
-        faults = sorted(
-            (f for f in findings if f.severity == "refuse"),
-            key=lambda f: f.name.endswith("_scaled"),
-        )
-        counts = Counter(f.name for f in faults[1:])
-        names = ", ".join(name if n == 1 else f"{n} of {name}" for name, n in counts.items())
-        more = (
-            f" (and {len(faults) - 1} more: {names}; 'axisight check LOG --robot MODEL' lists all)"
-            if names
-            else ""
-        )
-        super().__init__(f"{faults[0]}{more}")
+        faults = sorted((f for f in findings if f.severity == "refuse"), key=_mildness)
+        same: dict[tuple[str, int | None, str], list[Finding]] = {}
+        for fault in faults:
+            same.setdefault((fault.name, fault.axis, fault.field), []).append(fault)
+        super().__init__("\n".join(_told(members) for members in same.values()))
+
+
+def _mildness(fault: Finding) -> int:
+    """Return the place of a fault in a list, the worst first."""
+    if fault.name in NEEDED:
+        return 0
+    # A scale that nobody knows is often what another fault does: a position in deg scales torques.
+    if fault.name.endswith("_scaled"):
+        return 3
+    return 1 if fault.axis is None else 2
+
+
+def _told(members: list[Finding]) -> str:
+    """Return the lines about one fault, which may be in several logs."""
+    fault = members[0]
+    others = [f.log for f in members[1:] if f.log is not None]
+    also = f" (also in {', '.join(others)})" if others else ""
+    mend = mending_line(fault.name, fault.axis, fault.field)
+    return f"{fault}{also}" + (f"\n  {mend}" if mend else "")
 
 
 def flagged(findings: Iterable[Finding], names: Collection[str]) -> list[Finding]:

@@ -87,14 +87,21 @@ def check_inputs(
     - logs against the simulator: by the controller's law in closed loop, else by inverse dynamics;
     - the start and the noise of the logs.
 
-    A stage with a refusal is the last one, since later stages rest on it. ``despite``: names of faults that are
-    only flagged. Raises InputError for a name that is no fault, or for a fault that rules out any diagnosis.
+    Logs that the second stage refuses are left out of the later ones, so that all faults of a data set show in one
+    run. Any other refusal ends the checks, since later stages rest on it. ``despite``: names of faults that are only
+    flagged. Raises InputError for a name that is no fault, or for a fault that rules out any diagnosis.
     """
     check_names(despite)
-    found: list[Finding] = []
-    for stage in (_machine, _logs, _against_simulator, _start_and_noise):
-        found += flagged(stage(robot, estimation, validation), despite)
-        if refused(found):
+    found = flagged(_machine(robot, estimation, validation), despite)
+    if refused(found):
+        return tuple(found)
+    found += flagged(_logs(robot, estimation, validation), despite)
+    spoiled = {f.log for f in found if f.severity == "refuse"}
+    sound, held = ([x for x in logs if x.name not in spoiled] for logs in (estimation, validation))
+    for stage in (_against_simulator, _start_and_noise):
+        later = flagged(stage(robot, sound, held), despite) if sound or held else []
+        found += later
+        if refused(later):
             break
     return tuple(found)
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from axisight.gap.facts.faults import Finding
 from axisight.logs import Log
 from axisight.logs.grid import RATE_TOLERANCE
+from axisight.logs.mean_rate import whole_rate
 from axisight.robot import Robot
 
 # Joint angle per motor angle above which a ratio is flagged: the gear speeds up.
@@ -29,7 +30,7 @@ def check_machine(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
             out.append(Finding("axes_differ", "refuse", message, log.name, None, "axis"))
         factor = log.sample_time_s / robot.sample_time_s
         if abs(factor - 1.0) > RATE_TOLERANCE:
-            found = _another_rate(robot, log, factor)
+            found = _another_rate(robot, log, factor, logs[0])
             if found.name != _DIFFERS or not _at_its_own_rate(robot, log, logs[0]):
                 out.append(found)
     return out
@@ -41,15 +42,22 @@ def _at_its_own_rate(robot: Robot, log: Log, first: Log) -> bool:
     return same and not robot.told_speeds
 
 
-def _another_rate(robot: Robot, log: Log, factor: float) -> Finding:
+def _another_rate(robot: Robot, log: Log, factor: float, first: Log) -> Finding:
     name, unit = _DIFFERS, ""
     for known, known_name, words in ((1e3, "time_in_ms", "ms"), (1e6, "time_in_us", "us")):
         if abs(factor / known - 1.0) < 0.01:
             name, unit = known_name, f": time in {words}? Write it in s"
-    message = (
-        f"expected the robot's sample time {robot.sample_time_s:g} s, got {log.sample_time_s:g} s"
-        f"{unit}"
-    )
+    if name == _DIFFERS and not robot.told_speeds:
+        rate_hz = whole_rate(1.0 / first.sample_time_s)
+        message = (
+            f"expected the sample time {first.sample_time_s:.6g} s of {first.name}, got {log.sample_time_s:.6g} s. "
+            f"Put all logs on one grid by the line resample_hz = {rate_hz:.6g} in [time] of the column map"
+        )
+    else:
+        message = (
+            f"expected the robot's sample time {robot.sample_time_s:g} s, got {log.sample_time_s:g} s"
+            f"{unit}"
+        )
     return Finding(name, "refuse", message, log.name, None, "time_s")
 
 

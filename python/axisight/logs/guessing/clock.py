@@ -11,7 +11,7 @@ from axisight.logs.guessing.draft import Draft
 from axisight.logs.guessing.evidence import increases, time_units
 from axisight.logs.guessing.families import of_quantity
 from axisight.logs.guessing.series import Series
-from axisight.logs.mean_rate import mean_rate_hz, whole_rate
+from axisight.logs.mean_rate import mean_rate_hz, whole_rate, without_holes_s
 from axisight.logs.sources import Arrays
 from axisight.logs.units import si_factor
 
@@ -27,9 +27,6 @@ _RATE_NAMES = {
 }
 # If two units make sense, the one whose rate is nearer to this typical rate wins.
 _USUAL_HZ = 250.0
-
-# Steps from this multiple of the usual one are holes.
-_HOLE = 1.5
 
 
 def take_time(draft: Draft, arrays: Arrays) -> None:
@@ -50,9 +47,8 @@ def take_time(draft: Draft, arrays: Arrays) -> None:
     unit, why = _unit(draft, draft.time, rate)
     draft.time_unit = unit
     steps = np.diff(draft.time.values) * si_factor(unit)
-    usual = float(np.median(steps))
-    # Of stamps that jitter, the mean is the step over which positions differ; holes are left out.
-    draft.sample_time_s = float(steps[steps < _HOLE * usual].mean())
+    # Of stamps that jitter, the mean is the step over which positions differ.
+    draft.sample_time_s = without_holes_s(steps)
     draft.why["time"] = f"{why}: a sample every {draft.sample_time_s:.6g} s"
     if rate is not None and abs(draft.sample_time_s * rate - 1.0) > 0.01:
         draft.rate_name = None

@@ -1,7 +1,8 @@
 """Finds axes with a wrong sign from their friction, which must take energy.
 
 On an axis with little load the torque is mostly friction. If the simulator has none, comparing torques shows no
-sign. Energy does: the motor's work beyond that on the simulator's bodies must become heat.
+sign. Energy does: the motor's work beyond that on the simulator's bodies must become heat. A dead current, or a load
+that the simulator lacks, seems to drive as well; with the other sign it explains nothing.
 """
 
 from __future__ import annotations
@@ -9,14 +10,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from axisight.gap.facts.faults import Finding
+from axisight.gap.gate.by_dynamics.axis_travel import travels
+from axisight.gap.gate.by_dynamics.torque_fit import EXPLAINED, nuisance
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from axisight.gap.signals.motion import Motion
-from axisight.gap.signals.noise import white_std
 from axisight.logs import Log
-from axisight.logs.quality import quantization
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -25,44 +27,67 @@ Array = NDArray[np.float64]
 # log lowers also gives a negative share, as large as the share of gravity that the load adds; 30 % does not reach
 # the limit.
 _DRIVES = -0.5
-# Travel of an axis in steps of its encoder, or standard deviations of its noise, from which its work is known. On
-# an axis that creeps over a few counts, torque and speed agree by chance.
-_TRAVELS = 100.0
 
 
 def check_passive(robot: Robot, logs: Sequence[Log], motions: Sequence[Motion]) -> list[Finding]:
     """Return findings about axes whose friction seems to drive, over all logs and in each of them.
 
     ``motions``: low-passed motion and torque of each log. A spring to a wall, or a load, may do net work on an
-    axis in one log; a wrong sign shows in all.
+    axis in one log; a wrong sign shows in all, and the other sign explains the torque.
     """
-    shares = [_net_work(robot, log, at) for log, at in zip(logs, motions, strict=True)]
+    bare = _without_friction(robot)
+    bodies = [predict(bare, at) for at in motions]
+    shares = [_net_work(*one) for one in zip(logs, motions, bodies, strict=True)]
     net, scale = (np.sum(x, axis=0) for x in zip(*shares, strict=True))
     in_all = np.all([work <= 0.0 for work, _ in shares], axis=0)
     share = net / np.maximum(scale, 1e-300)
     return [
-        _finding(axis, share[axis]) for axis in np.flatnonzero(in_all & (share < _DRIVES)).tolist()
+        _finding(axis, share[axis])
+        for axis in np.flatnonzero(in_all & (share < _DRIVES)).tolist()
+        if _other_sign_explains(motions, bodies, axis)
     ]
 
 
-def _net_work(robot: Robot, log: Log, at: Motion) -> tuple[Array, Array]:
+def _other_sign_explains(motions: Sequence[Motion], bodies: Sequence[Array], axis: int) -> bool:
+    """Whether the torque of an axis is explained with the other sign, and less so with its own.
+
+    Both by the bodies, friction that brakes and an offset, fitted to one half of each log and judged on the other.
+    """
+    torque = [np.array_split(at[3][:, axis], 2) for at in motions]
+    columns = [
+        np.array_split(np.column_stack([own[:, axis], nuisance(at[1][:, axis])]), 2)
+        for own, at in zip(bodies, motions, strict=True)
+    ]
+    halves = [
+        (np.concatenate([y[k] for y in torque]), np.concatenate([x[k] for x in columns]))
+        for k in range(2)
+    ]
+    own, other = (_left_held_out(halves, sign) for sign in (1.0, -1.0))
+    return other < min(EXPLAINED, own)
+
+
+def _left_held_out(halves: Sequence[tuple[Array, Array]], sign: float) -> float:
+    """Return the share of a torque's variance that is left on either half by a fit to the other half."""
+    left = power = 0.0
+    for (y, x), (held_y, held_x) in zip(halves, halves[::-1], strict=True):
+        # The factors of bodies and friction are not negative; that of the offset, the last column, may be.
+        factors, _ = scipy.optimize.nnls(np.column_stack([x, -x[:, -1]]), sign * y)
+        found = np.column_stack([held_x, -held_x[:, -1]]) @ factors
+        left += float(((sign * held_y - found) ** 2).sum())
+        power += float(((held_y - held_y.mean()) ** 2).sum())
+    return left / max(power, 1e-300)
+
+
+def _net_work(log: Log, at: Motion, bodies: Array) -> tuple[Array, Array]:
     """Return the net work on the friction of each axis, and all work in either direction, (n_axes,) [J].
 
-    Both are zero on axes that stand.
+    ``bodies`` (n, n_axes): the torque of the simulator without friction [Nm]. Both are zero on axes that stand.
     """
-    bodies = predict(_without_friction(robot), at)
     scale = np.maximum(np.abs(at[3] * at[1]).sum(axis=0), np.abs(bodies * at[1]).sum(axis=0))
     net = ((at[3] - bodies) * at[1]).sum(axis=0)
     seconds = log.duration_s / len(at[1])
-    moves = _travels(log)
+    moves = travels(log)
     return np.where(moves, net, 0.0) * seconds, np.where(moves, scale, 0.0) * seconds
-
-
-def _travels(log: Log) -> NDArray[np.bool_]:
-    """Return which axes travel enough to be judged, (n_axes,)."""
-    steps = [found.step if (found := quantization(x)) else 0.0 for x in log.position_rad.T]
-    fine = np.maximum(steps, white_std(log.position_rad, log.sample_time_s))
-    return np.asarray(np.ptp(log.position_rad, axis=0) > _TRAVELS * fine)
 
 
 def _finding(axis: int, share: float) -> Finding:

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.facts.faults import Finding, GateSeverity, refused
+from axisight.gap.gate.by_dynamics.axis_travel import travels
 from axisight.gap.gate.by_dynamics.friction_sign import check_passive
 from axisight.gap.gate.by_dynamics.gravity_share import check_gravity_share
+from axisight.gap.gate.by_dynamics.load_or_rotor import load_or_rotor_explains
 from axisight.gap.gate.by_dynamics.small_errors import check_small_errors
 from axisight.gap.gate.by_dynamics.torque_fit import EXPLAINED, SAME, TorqueFit, torque_fit
 from axisight.gap.gate.by_dynamics.undone_mistakes import Mistake, predict, undone, with_gravity
@@ -56,7 +58,8 @@ def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     # Small errors are those of a model that is right otherwise.
     if refused(out) or without_gravity:
         return out
-    return [*out, *check_small_errors(robot, motions)]
+    moves = np.all([travels(log) for log in logs], axis=0)
+    return [*out, *check_small_errors(robot, motions, moves)]
 
 
 def thinned(log: Log) -> tuple[float, Motion]:
@@ -77,7 +80,7 @@ def _one_log(robot: Robot, log: Log, at: Motion) -> list[Finding]:
         found = _most_likely(robot, at, given)
         if found is not None:
             return [_named(log, found, given)]
-    return _scales(robot, log, given)
+    return _scales(robot, log, at, given)
 
 
 def _too_fast(robot: Robot, log: Log, at: Motion) -> list[Finding]:
@@ -100,10 +103,16 @@ def _most_likely(robot: Robot, at: Motion, given: TorqueFit) -> Mistake | None:
     best = min(sound, key=lambda mistake: mistake.fit.total, default=None)
     if best is None:
         return None
-    removed = given.total - best.fit.total
-    axes = list(best.axes)
-    explains = float(best.fit.left[axes].max()) < EXPLAINED
-    enough = removed > max(_REMOVED * given.total, _LEAST_REMOVED)
+    # An axis on which the prediction shows neither way says nothing.
+    tells = (given.gain > _CARRIES) | (best.fit.gain > _CARRIES)
+    before, after = (float(fit.left[tells].sum()) for fit in (given, best.fit))
+    left = best.fit.left[[axis for axis in best.axes if tells[axis]]]
+    if not left.size:
+        return None
+    # A mistake of the whole machine is judged by all its axes together, as one may lack much else.
+    whole = len(best.axes) == robot.n_axes
+    explains = float(left.mean() if whole else left.max()) < EXPLAINED
+    enough = before - after > max(_REMOVED * before, _LEAST_REMOVED)
     return best if enough and explains else None
 
 
@@ -137,15 +146,17 @@ def _named(log: Log, found: Mistake, given: TorqueFit) -> Finding:
     return Finding(found.name, "refuse", message, None if whole else log.name, axis, field)
 
 
-def _scales(robot: Robot, log: Log, given: TorqueFit) -> list[Finding]:
+def _scales(robot: Robot, log: Log, at: Motion, given: TorqueFit) -> list[Finding]:
     """Return findings about torques that are a multiple of the predicted ones."""
     out = []
     known = (given.gain > _CARRIES) & (given.left < EXPLAINED) & (given.slope > 0.0)
     slopes = given.slope[known]
-    everywhere = bool(np.all((slopes < _ALL_AXES[0]) | (slopes > _ALL_AXES[1])))
+    # One axis of an arm says nothing of the unit of all.
+    enough = len(slopes) > 1 or robot.n_axes == 1
+    everywhere = enough and bool(np.all((slopes < _ALL_AXES[0]) | (slopes > _ALL_AXES[1])))
     for axis in np.flatnonzero(known).tolist():
         slope = float(given.slope[axis])
-        if SAME[0] < slope < SAME[1]:
+        if SAME[0] < slope < SAME[1] or load_or_rotor_explains(robot, at, axis):
             continue
         name = scale_name("torque", slope, float(robot.gear_ratio[axis]))
         a_unit = not (_ONE_AXIS[0] < slope < _ONE_AXIS[1] or name.endswith("_scaled"))

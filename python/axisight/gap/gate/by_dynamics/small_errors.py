@@ -2,7 +2,8 @@
 
 All of them act to first order. A late torque changes by its rate times the delay. A late axis changes the
 torques of other axes by its motion in that time. An encoder off its zero turns gravity. One regression
-estimates all of them, beside a factor of the prediction, friction and an offset on each axis.
+estimates all of them, beside a factor of the prediction, friction and an offset on each axis. A load that the
+simulator lacks looks like an encoder off its zero; where it explains more, it is taken off first.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.facts.faults import Finding, GateSeverity
+from axisight.gap.gate.by_dynamics.load_or_rotor import load_torques
 from axisight.gap.gate.by_dynamics.torque_fit import ALIKE, PARTS, SIGNIFICANT, nuisance
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from axisight.gap.signals.motion import Motion
@@ -40,20 +42,34 @@ _REMOVED = 0.05
 _TELLS = 0.1
 
 
-def check_small_errors(robot: Robot, motions: Sequence[tuple[float, Motion]]) -> list[Finding]:
+def check_small_errors(
+    robot: Robot, motions: Sequence[tuple[float, Motion]], moves: NDArray[np.bool_]
+) -> list[Finding]:
     """Return flags about the time of torques, and the time and zero of single axes.
 
-    ``motions``: sample time [s] and low-passed motion of each log; all logs must show an error.
+    ``motions``: sample time [s] and low-passed motion of each log; all logs must show an error. ``moves`` (n_axes,):
+    the axes that travel; the time of another does not show.
     """
-    parts = []
+    parts, loads = [], []
     names: list[tuple[str, int]] = []
     for sample_time_s, at in motions:
         base = predict(robot, at)
         names, effects = _effects(robot, sample_time_s, at, base)
-        parts.append(_projected(at, base, effects))
+        shown = [k for k, (kind, i) in enumerate(names) if kind != "axis_delayed" or moves[i]]
+        names, effects = [names[k] for k in shown], [effects[k] for k in shown]
+        target, found = _projected(at, base, [*effects, *load_torques(robot, at, base)])
+        parts.append((target, found[: len(names)]))
+        loads.append(found[len(names) :])
     targets = [target for target, _ in parts]
     shared = [kind == "time_shifted" for kind, _ in names]
     limits = [_MOST_RAD if kind == "position_offset" else _MOST_S for kind, _ in names]
+    first = _strongest(
+        targets, [[part[i] for _, part in parts] for i in range(len(names))], limits, shared
+    )
+    if first is None:
+        return []
+    left, share = _without_load(targets, loads)
+    targets = left if share > first.share else targets
     out = []
     # The error that explains most comes first; the others must explain the rest.
     for _ in range(len(names)):
@@ -68,6 +84,19 @@ def check_small_errors(robot: Robot, motions: Sequence[tuple[float, Motion]]) ->
         taken = columns[best.index]
         targets = [t - best.size * c for t, c in zip(targets, taken, strict=True)]
     return out
+
+
+def _without_load(targets: list[Array], loads: list[list[Array]]) -> tuple[list[Array], float]:
+    """Return the targets without the load that fits all logs best, and the share that it explains."""
+    columns = np.concatenate([np.stack([x.ravel() for x in own], axis=1) for own in loads])
+    whole = np.concatenate([target.ravel() for target in targets])
+    factors = np.linalg.lstsq(columns, whole, rcond=None)[0]
+    left = [
+        target - sum(f * x for f, x in zip(factors, own, strict=True))
+        for target, own in zip(targets, loads, strict=True)
+    ]
+    power = max(float(whole @ whole), 1e-300)
+    return left, 1.0 - sum(float((x**2).sum()) for x in left) / power
 
 
 def _effects(

@@ -68,6 +68,9 @@ def undone(robot: Robot, at: Motion) -> Iterator[Mistake]:
         yield Mistake("sign_flipped", "torque_cmd", (i,), words, turned)
         yield Mistake("sign_flipped", "position", (i,), words, moved(sign))
     every = tuple(range(n))
+    if n > 1:
+        words = "change the sign of all torques: these are the loads, not the torques of the drives"
+        yield Mistake("sign_flipped", "torque_cmd", every, words, torque_fit(-torque, given, at))
     for name, factor in _UNITS.items():
         yield Mistake(name, "position", every, f"multiply by {factor:.4g}", moved(factor))
     if np.any(np.abs(np.log(np.abs(robot.gear_ratio))) > _GEARED):
