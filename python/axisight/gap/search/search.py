@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from axisight.fitting.divergence import Diverged, must_hold
 from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.trace import Stop
 from axisight.gap.fit.data_blocks import layout_of
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.settling import settled
+from axisight.gap.fit.time_limit import TimeLimit, TimeUp
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, falls
 from axisight.gap.ranking.likelihood import FORMULA_ERROR
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
@@ -41,17 +43,42 @@ def search(
     expected: Array,
     settings: Settings,
     progress: Progress,
+    limit: TimeLimit,
 ) -> SearchState:
     """Search for the causes of a gap.
 
     ``candidates``: makes the hypotheses from the residual of a model; ``expected`` (n_axes,): mean square of the
-    weighted residual of noise alone.
+    weighted residual of noise alone. ``limit``: where it ends the search, the causes of finished rounds stay.
     """
     progress("re-fitting the simulator", 0, 1)
+    fitter.work.stage = "refit"
     baseline = _refitted(fitter)
     progress("re-fitting the simulator", 1, 1)
     floor = expected[baseline.axis] * baseline.samples
     out = SearchState(baseline, baseline, floor, layout_of(baseline), adds_up=fitter.adds_up)
+    limited = fitter.until(limit)
+    try:
+        _add_causes(limited, candidates, out, settings, progress)
+        limited.work.stage = "moves"
+        make(AT_THE_END, Context(limited, out, settings, last=out.rounds[-1].standings))
+        finish(limited, out)
+    except TimeUp:
+        # A round that was cut short adds nothing: its leaders have not met all their rivals.
+        causes = tuple(f.effect.label for f in out.model.free)
+        out.stopped = Stop(limit.limit_s, out.number, limited.work.stage, causes)
+        out.rounds = out.rounds or [Round((), (), out.left())]
+    fitter.work.stage = "measuring"
+    return out
+
+
+def _add_causes(
+    fitter: ModelFitter,
+    candidates: Callable[[FittedModel], list[Hypothesis]],
+    out: SearchState,
+    settings: Settings,
+    progress: Progress,
+) -> None:
+    """Add causes round by round until a round finds none."""
     refused: set[str] = set()
     kept = ColumnCache()
 
@@ -59,11 +86,12 @@ def search(
         return fresh(candidates(model), model, refused)
 
     for number in range(1, _MOST_ROUNDS + 1):
+        out.number = number
         least = out.least_falls(settings)
         round_ = SearchRound(
             fitter,
             out.model,
-            floor,
+            out.floor,
             out.layout,
             least,
             settings,
@@ -83,21 +111,21 @@ def search(
             standings, taken = _judged(round_, trials, out, settings, len(options))
         out.skipped |= round_.skipped
         out.sensitivities |= round_.sensitivities
-        out.rounds.append(Round(standings, taken, out.left()))
+        # The round has its causes once they are in the model.
+        out.rounds.append(Round(standings, (), out.left()))
         if not taken:
             break
         diverged = _take_in(round_, out, taken, progress)
+        out.rounds[-1] = replace(out.rounds[-1], accepted=taken)
         if diverged is not None:
             # Together they diverge: refuse the first, which promised most.
             refused.add(taken[0][0].trial.label)
             out.skipped[taken[0][0].trial.label] = str(diverged)
             continue
+        fitter.work.stage = "moves"
         refused |= make(AFTER_EACH_ROUND, Context(fitter, out, settings, offered))
         if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
             break
-    make(AT_THE_END, Context(fitter, out, settings, last=out.rounds[-1].standings))
-    finish(fitter, out)
-    return out
 
 
 def _refitted(fitter: ModelFitter) -> FittedModel:
@@ -116,6 +144,7 @@ def _judged(
     tried: int,
 ) -> tuple[tuple[AxisPosterior, ...], tuple[tuple[RankedHypothesis, AxisPosterior], ...]]:
     """Return the posterior of every axis, and the causes to add, at most up to ``settings.max_causes``."""
+    round_.fitter.work.stage = "judging"
     standings = tuple(round_.standings(trials))
     taken = _taken(round_, trials, standings, state, settings, tried)
     room = settings.max_causes - len(state.model.free)
@@ -288,6 +317,7 @@ def _take_in(
     """Add causes to the model; return how it diverges with them, else None."""
     label = "adding " + ", ".join(r.trial.label for r, _ in taken)
     progress(label, 0, 1)
+    round_.fitter.work.stage = "adding"
     start = taken[0][0].trial.fitted
     # If only one of a pair fits in `max_causes`, its trial holds both: fit it again without the other.
     if len(taken) == 1 and len(start.free) <= len(state.model.free) + 1:

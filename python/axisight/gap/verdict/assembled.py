@@ -104,6 +104,7 @@ def assembled(
                 refit=refit,
                 joints=robot.axis_names,
                 mode=view.mode,
+                stopped=found.stopped,
             )
         ),
         gap=gap,
@@ -140,6 +141,7 @@ def assembled(
             trace_of(found),
             named=tuple(x for c in conclusion.causes for x in c.ledger),
             work=view.fitter.work.done,
+            work_by_stage=dict(view.fitter.work.by_stage),
         ),
         provenance=_provenance(robot, view, names, settings),
     )
