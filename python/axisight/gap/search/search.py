@@ -23,7 +23,7 @@ from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.screening.column_cache import ColumnCache
 from axisight.gap.screening.promise import HOPELESS
 from axisight.gap.screening.screening import kept_beside
-from axisight.gap.screening.search_round import Progress, SearchRound, fresh, interact
+from axisight.gap.screening.search_round import Progress, SearchRound, fresh, interact, same
 from axisight.gap.search.composites import named_simply
 from axisight.gap.search.contest import Context
 from axisight.gap.search.moves import AFTER_EACH_ROUND, AT_THE_END, finish, make
@@ -106,9 +106,11 @@ def _add_causes(
         standings, taken = _judged(round_, trials, out, settings, len(options))
         if round_.first(standings, trials) not in {r.trial.label for r, _ in taken}:
             # The leader that others waited for is no cause.
+            before = trials
             trials = round_.run_waiting(trials, options, number)
             trials = round_.refined(trials, options, number, even_felt=True)
-            standings, taken = _judged(round_, trials, out, settings, len(options))
+            if not same(trials, before):
+                standings, taken = _judged(round_, trials, out, settings, len(options))
         out.skipped |= round_.skipped
         out.sensitivities |= round_.sensitivities
         # The round has its causes once they are in the model.
