@@ -140,7 +140,7 @@ def conclude(
 
     ``stands_out``: whether the plain torque error of the re-fitted simulator lies above the noise. Otherwise
     an unexplained residual counts as noise of an unexpected colour, up to what noise can be. ``shown``: causes
-    that the logs show by themselves; they come first.
+    that the logs show by themselves; they come first. A gap is *unknown* where the time limit stopped the search.
     """
     accepted = found.accepted
     explained = found.explained()
