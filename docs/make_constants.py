@@ -67,6 +67,7 @@ SETTINGS: Mapping[str, str] = {
     "false_alarms": "Probability of a false alarm of all hypotheses together.",
     "bootstrap": "Draws of a bootstrap interval.",
     "seed": "Rules every random choice.",
+    "time_limit_s": "The search for causes stops after this time [s].",
 }
 """Settings that are numbers, in words."""
 

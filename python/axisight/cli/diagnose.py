@@ -242,6 +242,14 @@ def diagnose_command(
             help="Hypotheses that are tried at a time. Default: all cores.",
         ),
     ] = None,
+    time_limit: Annotated[
+        float,
+        typer.Option(
+            metavar="SECONDS",
+            rich_help_panel=ADVANCED,
+            help="Stop the search after this time and report what was found by then. inf: no limit.",
+        ),
+    ] = Settings.time_limit_s,
     untrusted: Untrusted = False,
     max_bytes: MaxBytes = None,
 ) -> None:
@@ -285,7 +293,9 @@ def diagnose_command(
             "--moving": moving,
             "--cut-at-rests": cut_at_rests,
         }
-        settings = Settings(seed=seed, cutoff_hz=cutoff_hz, max_causes=max_causes)
+        settings = Settings(
+            seed=seed, cutoff_hz=cutoff_hz, max_causes=max_causes, time_limit_s=time_limit
+        )
         # Imported here, because only fleets need the libraries for tables and schedulers.
         run_fleet = import_module("axisight.cli.fleet").run_fleet
         run_fleet(fleet, out, settings, workers, scheduler, [k for k, v in for_one.items() if v])
@@ -330,6 +340,7 @@ def diagnose_command(
             cutoff_hz=cutoff_hz,
             max_causes=max_causes,
             despite=tuple(despite or ()),
+            time_limit_s=time_limit,
             threads=threads or os.cpu_count() or 1,
         )
         given = _tolerances(tolerance or [], inputs.robot)

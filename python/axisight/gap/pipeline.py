@@ -11,6 +11,7 @@ from typing import Any
 from axisight.effects import Effect
 from axisight.gap.facts.result import Diagnosis
 from axisight.gap.facts.settings import Settings
+from axisight.gap.fit.time_limit import TimeLimit
 from axisight.gap.intake.given import Given, check_options, given_inputs
 from axisight.gap.intake.prepared_logs import behind_gate
 from axisight.gap.measure.by_axis import believed_by_axis
@@ -89,7 +90,8 @@ def diagnose(
     The diagnosis. It compares in closed loop if the robot has a controller and every log its velocity
     references. It does so too if no log has references and the gears are elastic: the references are
     then those for which the controller commands the logged torque. Otherwise it compares by inverse
-    dynamics. The same input, settings and version give the same result.
+    dynamics. The same input, settings and version give the same result, unless the time limit ends the
+    search: ``Diagnosis.trace.stopped`` says so.
 
     Raises
     ------
@@ -122,7 +124,7 @@ def _diagnosed(
     signals: bool,
 ) -> Diagnosis:
     """Return the diagnosis of a simulator and logs with roles."""
-    started = time.monotonic()
+    started, limit = time.monotonic(), TimeLimit(chosen.time_limit_s)
     fit_logs, held_logs = given.estimation, given.validation
     machine, chosen = loaded(given.source, chosen, fit_logs[0].sample_time_s)
     asked = asked_of(machine, asking.separate, asking.to_show, asking.within)
@@ -137,12 +139,14 @@ def _diagnosed(
     if later is not inputs:
         inputs, view = later, later.view(chosen)
         baseline = refitted(view.fitter, progress)
-    found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress, baseline)
+    found = search(
+        view.fitter, view.candidates, view.floor.expected, chosen, progress, limit, baseline
+    )
     taken, scatter = with_scatter_taken(inputs.robot, found, chosen)
     if scatter:
         inputs = inputs.with_effects_of(taken, scatter)
         view = inputs.view(chosen)
-        found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress)
+        found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress, limit)
     machine, held_logs, commanded = inputs.robot, inputs.validation, inputs.commanded
     found = with_constants_told(found, view.fitter, view.shown)
     found = with_balanced_values(believed_by_axis(found, view.fitter, chosen), view.fitter)

@@ -32,7 +32,7 @@ class Account:
     """The lines of an account.
 
     - ``comparisons``: per axis and round, a line on the leader and lines on its rivals.
-    - ``moves``: of the search, in order.
+    - ``moves``: of the search, in order, and where its time limit stopped it.
     - ``named``: changes of probability after a cause was named.
     - ``rules``: the rules that the lines name, each with its reason.
     - ``work``: the computing effort.
@@ -63,7 +63,10 @@ def account(trace: Trace) -> Account:
     used = dict.fromkeys(entry.rule for entry in entries)
     return Account(
         tuple((_first(c), tuple(_rivals(c))) for c in told),
-        tuple(f"move {k}, {_move(step)}" for k, step in enumerate(trace.steps, start=1)),
+        (
+            *(f"move {k}, {_move(step)}" for k, step in enumerate(trace.steps, start=1)),
+            *(() if trace.stopped is None else (trace.stopped.words,)),
+        ),
         tuple(f"{x.hypothesis}, once named: {_entry(x.rule, x.nats)}." for x in trace.named),
         tuple(f"{_plain(rule)}: {RULES[rule]}" for rule in used),
         _work(trace.work),

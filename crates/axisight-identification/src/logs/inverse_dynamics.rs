@@ -6,14 +6,16 @@
 use super::gram::{Block, blocks};
 use super::lateness::commanded;
 use super::problem::{
-    Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, picked, seeded,
+    Evaluation, FitParameter, Problem, ProblemError, Target, check_logs, invalid, picked, seeded,
 };
-use axisight_core::effects::{CoupledAxis, Motor};
+use axisight_core::effects::{Acts, CoupledAxis, Motor, info};
 use axisight_core::plant::{Axis, Plant, assemble};
-use axisight_core::robot::{DynamicsScratch, EffectSetting, RobotDescription};
+use axisight_core::robot::{DynamicsScratch, EffectSetting, Parameter, Place, RobotDescription};
 use axisight_numerics::Weighting;
 use axisight_scalar::{Dual, Scalar};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Number of derivatives per pass.
@@ -127,54 +129,136 @@ impl InverseDynamics {
         Ok(found)
     }
 
-    /// Predicted torque of one record, `[quantity][axis][sample]`, with the value first.
-    ///
-    /// If no seed is in the arm, its dynamics, which are most of the work, use plain numbers.
-    fn predict<S: Scalar>(
+    /// The columns in passes of at most [`SEEDS`]: those of each axis apart, and those of the arm.
+    fn passes(&self, columns: &[usize]) -> Vec<Pass> {
+        let mut by_axis: BTreeMap<Option<usize>, Pass> = BTreeMap::new();
+        let mut out = Vec::new();
+        for (place, parameter) in columns.iter().enumerate() {
+            let axis = self.own_axis(*parameter);
+            let pass = by_axis.entry(axis).or_insert_with(|| Pass::of(axis));
+            pass.places.push(place);
+            pass.seeds.push(*parameter);
+            if pass.seeds.len() == SEEDS {
+                out.push(std::mem::replace(pass, Pass::of(axis)));
+            }
+        }
+        out.extend(by_axis.into_values().filter(|pass| !pass.seeds.is_empty()));
+        out
+    }
+
+    /// The axis whose drive a parameter belongs to; `None` for links and for effects of several
+    /// axes.
+    fn own_axis(&self, parameter: usize) -> Option<usize> {
+        match self.parameters[parameter].target {
+            Target::Robot(Parameter::MotorInertia(joint) | Parameter::ViscousFriction(joint)) => {
+                let before = self.robot.joints[..joint].iter();
+                Some(before.filter(|j| j.drive.is_some()).count())
+            }
+            Target::Robot(_) => None,
+            Target::Effect(effect, _) => {
+                let setting = self.effects.get(effect)?;
+                match setting.place {
+                    Place::Axis(axis) if info(&setting.name).ok()?.acts != Acts::Arm => Some(axis),
+                    _ => None,
+                }
+            }
+        }
+    }
+
+    /// The plant at `theta`, with derivatives along `seeds`.
+    fn plant<S: Scalar>(&self, theta: &[f64], seeds: &[usize]) -> Result<Plant<S>, ProblemError> {
+        let (overrides, settings) =
+            seeded::<S>(&self.parameters, &self.effects, theta, seeds, S::seeded);
+        Ok(assemble(&self.robot, &overrides, &settings)?)
+    }
+
+    /// Residuals of one record, and the forces on the joints of the plain arm along it, which are
+    /// most of the work.
+    fn value(
         &self,
         record: &MotionRecord,
         theta: &[f64],
-        seeds: &[usize],
-    ) -> Result<Vec<Vec<Vec<f64>>>, ProblemError> {
-        let (overrides, settings) =
-            seeded::<S>(&self.parameters, &self.effects, theta, seeds, S::seeded);
-        let plant = assemble(&self.robot, &overrides, &settings)?;
-        if plant.arm_carries_derivatives() {
-            return Ok(self.predicted(&plant, record, seeds.len(), &mut Arm::new(&plant)));
+    ) -> Result<(Vec<f64>, Vec<f64>), ProblemError> {
+        let plant = self.plant::<f64>(theta, &[])?;
+        let n_axes = plant.axes.len();
+        let mut forces = Vec::new();
+        let mut arm = Arm::new(&plant);
+        for k in 0..record.position.len() / n_axes {
+            forces.extend_from_slice(arm.forces(record, k));
         }
-        let (overrides, settings) =
-            seeded::<f64>(&self.parameters, &self.effects, theta, &[], f64::seeded);
-        let plain = assemble(&self.robot, &overrides, &settings)?;
-        Ok(self.predicted(&plant, record, seeds.len(), &mut Arm::new(&plain)))
+        let stored = stored(&forces, plant.chain.len());
+        let mut series = self.predicted(&plant, record, 0, 0..n_axes, stored);
+        for (axis, model) in series[0].iter_mut().enumerate() {
+            let measured = record.torque[axis..].iter().step_by(n_axes);
+            model.iter_mut().zip(measured).for_each(|(y, x)| *y -= x);
+        }
+        let residual = self.whitened(record, &series).swap_remove(0);
+        Ok((residual, forces))
     }
 
-    /// Torque of `plant` along a record, `[quantity][axis][sample]`, with the value first.
+    /// Whitened derivatives of one record, one series for each seed of a pass. `forces` on the
+    /// joints of the plain arm serve if no seed is in the arm.
+    fn slopes(
+        &self,
+        record: &MotionRecord,
+        theta: &[f64],
+        pass: &Pass,
+        forces: &[f64],
+    ) -> Result<Vec<Vec<f64>>, ProblemError> {
+        let plant = self.plant::<Dual<f64, SEEDS>>(theta, &pass.seeds)?;
+        let (all, n_seeds) = (0..plant.axes.len(), pass.seeds.len());
+        let series = if plant.arm_carries_derivatives() {
+            let mut arm = Arm::new(&plant);
+            let along = |k: usize, force: &mut Vec<_>| {
+                force.clear();
+                force.extend_from_slice(arm.forces(record, k));
+            };
+            self.predicted(&plant, record, n_seeds, all, along)
+        } else {
+            let axes = pass.axis.map_or(all, |axis| axis..axis + 1);
+            let stored = stored(forces, plant.chain.len());
+            self.predicted(&plant, record, n_seeds, axes, stored)
+        };
+        Ok(self.whitened(record, &series[1..]))
+    }
+
+    /// Torque of some axes of `plant` along a record, `[quantity][axis][sample]`, with the value
+    /// first. Series of other axes are empty. `forces` gives those on all joints of the chain, by
+    /// sample.
     fn predicted<S: Scalar, T: Scalar>(
         &self,
         plant: &Plant<S>,
         record: &MotionRecord,
         n_seeds: usize,
-        arm: &mut Arm<'_, T>,
+        axes: Range<usize>,
+        mut forces: impl FnMut(usize, &mut Vec<T>),
     ) -> Vec<Vec<Vec<f64>>> {
         let n_axes = plant.axes.len();
         let n_samples = record.position.len() / n_axes;
-        let mut out = vec![vec![Vec::with_capacity(n_samples); n_axes]; n_seeds + 1];
+        let mut out = vec![vec![Vec::new(); n_axes]; n_seeds + 1];
+        for series in &mut out {
+            series[axes.clone()]
+                .iter_mut()
+                .for_each(|x| x.reserve(n_samples));
+        }
+        let mut force = Vec::new();
         for k in 0..n_samples {
-            let forces = arm.forces(record, k);
+            forces(k, &mut force);
             let time = S::constant(k as f64 * self.robot.sample_time);
-            for (i, axis) in plant.axes.iter().enumerate() {
-                let turned = reaction(plant, forces, i) + coupled(plant, record, k, i);
-                let force = lifted(&forces[axis.joint]);
-                let command = drive(axis, record, (k * n_axes + i, time), force, turned);
+            for i in axes.clone() {
+                let axis = &plant.axes[i];
+                let turned = reaction(plant, &force, i) + coupled(plant, record, k, i);
+                let own = lifted(&force[axis.joint]);
+                let command = drive(axis, record, (k * n_axes + i, time), own, turned);
                 out[0][i].push(command.lane(0));
                 for (seed, series) in out[1..].iter_mut().enumerate() {
                     series[i].push(command.partial(seed, 0));
                 }
             }
         }
-        for (i, axis) in plant.axes.iter().enumerate() {
+        for i in axes {
             let own = out.iter_mut().map(|x| std::mem::take(&mut x[i])).collect();
-            let late = commanded(&axis.kernels, self.robot.sample_time, own);
+            let late = commanded(&plant.axes[i].kernels, self.robot.sample_time, own);
             out.iter_mut()
                 .zip(late)
                 .for_each(|(x, series)| x[i] = series);
@@ -182,35 +266,25 @@ impl InverseDynamics {
         out
     }
 
-    /// Whitened series of residuals and derivatives of one record, axis after axis.
-    fn pass(
-        &self,
-        record: &MotionRecord,
-        theta: &[f64],
-        seeds: &[usize],
-    ) -> Result<Vec<Vec<f64>>, ProblemError> {
-        let mut series = match seeds.len() {
-            0 => self.predict::<f64>(record, theta, seeds)?,
-            _ => self.predict::<Dual<f64, SEEDS>>(record, theta, seeds)?,
-        };
+    /// Whitened series of one record, axis after axis, of `[quantity][axis][sample]`. An empty
+    /// series is one of zeros.
+    fn whitened(&self, record: &MotionRecord, series: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
         let n_axes = self.robot.n_axes();
-        for (axis, model) in series[0].iter_mut().enumerate() {
-            for (k, y) in model.iter_mut().enumerate() {
-                *y -= record.torque[k * n_axes + axis];
-            }
-        }
         let n_samples = record.torque.len() / n_axes;
         let mut out = vec![Vec::new(); series.len()];
         for (axis, weighting) in self.weighting.iter().enumerate() {
-            let plan = weighting.plan(n_samples, self.robot.sample_time);
             // Series of zeros need no filter. All others are filtered in pairs.
             let acting: Vec<usize> = (0..series.len())
                 .filter(|i| series[*i][axis].iter().any(|x| *x != 0.0))
                 .collect();
-            let start = out[0].len();
+            let start = out.first().map_or(0, Vec::len);
             for target in &mut out {
                 target.resize(start + weighting.output_len(n_samples), 0.0);
             }
+            if acting.is_empty() {
+                continue;
+            }
+            let plan = weighting.plan(n_samples, self.robot.sample_time);
             for pair in acting.chunks(2) {
                 let (first, second) = (pair[0], pair[pair.len() - 1]);
                 let (a, b) = plan.apply_pair(&series[first][axis], &series[second][axis]);
@@ -227,7 +301,27 @@ impl InverseDynamics {
                 }
             }
         }
-        Ok(out)
+        out
+    }
+}
+
+/// Columns that are computed together.
+struct Pass {
+    /// The axis whose drive all of them belong to; `None` if there is no such axis.
+    axis: Option<usize>,
+    /// Places among the requested columns.
+    places: Vec<usize>,
+    /// Their parameters.
+    seeds: Vec<usize>,
+}
+
+impl Pass {
+    fn of(axis: Option<usize>) -> Self {
+        Self {
+            axis,
+            places: Vec::new(),
+            seeds: Vec::new(),
+        }
     }
 }
 
@@ -267,6 +361,14 @@ impl<'a, S: Scalar> Arm<'a, S> {
             .dynamics
             .forces_along(q, v, a, &mut self.scratch, &mut self.force);
         &self.force
+    }
+}
+
+/// The forces of each sample, of `n_joints` joints, as [`Arm::forces`] gave them.
+fn stored(forces: &[f64], n_joints: usize) -> impl FnMut(usize, &mut Vec<f64>) {
+    move |k, force| {
+        force.clear();
+        force.extend_from_slice(&forces[k * n_joints..(k + 1) * n_joints]);
     }
 }
 
@@ -349,31 +451,29 @@ fn drive<S: Scalar>(
 
 impl Problem for InverseDynamics {
     fn evaluate(&self, theta: &[f64], columns: &[usize]) -> Result<Evaluation, ProblemError> {
-        let mut chunks: Vec<&[usize]> = columns.chunks(SEEDS).collect();
-        if chunks.is_empty() {
-            chunks.push(&[]);
-        }
-        let tasks: Vec<(&Arc<MotionRecord>, usize, &[usize])> = self
+        let values: Vec<(Vec<f64>, Vec<f64>)> = self
             .records
-            .iter()
-            .flat_map(|r| chunks.iter().enumerate().map(move |(i, c)| (r, i, *c)))
+            .par_iter()
+            .map(|record| self.value(record, theta))
+            .collect::<Result<_, ProblemError>>()?;
+        let passes = self.passes(columns);
+        let tasks: Vec<(usize, &Pass)> = (0..self.records.len())
+            .flat_map(|record| passes.iter().map(move |pass| (record, pass)))
             .collect();
         let done: Vec<_> = tasks
             .par_iter()
-            .map(|(record, _, seeds)| self.pass(record, theta, seeds))
+            .map(|(i, pass)| self.slopes(&self.records[*i], theta, pass, &values[*i].1))
             .collect::<Result<_, ProblemError>>()?;
-        let mut residual = Vec::new();
         let mut derivatives = vec![Vec::new(); columns.len()];
-        for ((_, chunk, seeds), series) in tasks.iter().zip(done) {
-            let mut series = series.into_iter();
-            let first = series.next().unwrap_or_default();
-            if *chunk == 0 {
-                residual.extend(first);
-            }
-            for (i, column) in series.take(seeds.len()).enumerate() {
-                derivatives[chunk * SEEDS + i].extend(column);
+        for ((_, pass), series) in tasks.iter().zip(done) {
+            for (place, column) in pass.places.iter().zip(series) {
+                derivatives[*place].extend(column);
             }
         }
+        let residual = values
+            .into_iter()
+            .flat_map(|(residual, _)| residual)
+            .collect();
         Ok(Evaluation::new(residual, derivatives))
     }
 

@@ -53,7 +53,9 @@ class Settings:
     ``explained_share``: below it, the causes found do not explain the gap.
     ``cutoff_hz``: of the low-pass on motion and torque in inverse dynamics; None chooses it
     from the data. ``despite``: names of faults of the logs that would be refused, and are flagged
-    only. ``seed`` rules every random choice.
+    only. ``time_limit_s``: the search stops after this time, counted from the start of the diagnosis, and what was
+    found by then is reported; infinity is no limit. A limit that is not reached changes nothing.
+    ``seed`` rules every random choice.
     """
 
     tolerances: Mapping[str, float] | None = None
@@ -72,6 +74,7 @@ class Settings:
     despite: tuple[str, ...] = ()
     bootstrap: int = 1000
     seed: int = 0
+    time_limit_s: float = 600.0
     threads: int = field(default_factory=lambda: os.cpu_count() or 1)
 
     def tolerances_of(self, robot: Robot) -> Mapping[str, float]:
@@ -81,8 +84,9 @@ class Settings:
         return {**DEFAULT_TOLERANCES, **robot.tolerances}
 
     def as_dict(self, robot: Robot) -> dict[str, Any]:
-        """Return the settings by name as plain values; threads are none, they change no result."""
-        names = [f.name for f in fields(self) if f.name != "threads"]
+        """Return the settings by name as plain values, without those that change no result of a finished search."""
+        effort = ("threads", "time_limit_s")
+        names = [f.name for f in fields(self) if f.name not in effort]
         return {
             **{name: getattr(self, name) for name in names},
             "despite": list(self.despite),

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from axisight.arguments import counted
 from axisight.display.summary import summarized
 
 NONE = "none"
@@ -53,6 +54,20 @@ MOVES: Mapping[str, str] = MappingProxyType(
     }
 )
 """Every move of the search, with what it does in one sentence."""
+
+STAGES: Mapping[str, str] = MappingProxyType(
+    {
+        "refit": "Re-fits the simulator without effects.",
+        "screening": "Predicts the gain of every candidate by one linear step.",
+        "fitting": "Fits the promising candidates.",
+        "refining": "Fits the leaders of each axis again, and their rivals from where the leaders ended.",
+        "judging": "Compares leaders with their parts and with pairs of effects.",
+        "adding": "Fits the model with the causes of a round.",
+        "moves": "Tries to change the set of causes.",
+        "measuring": "Fits the final values and measures what each cause does.",
+    }
+)
+"""Every stage of a diagnosis that fits models, with what it does in one sentence."""
 
 
 def log_odds(times: float) -> float:
@@ -123,19 +138,52 @@ class Work:
     evaluations: int = 0
     linearizations: int = 0
 
+    def __add__(self, other: Work) -> Work:
+        """Return the sum of two amounts."""
+        return Work(
+            self.fits + other.fits,
+            self.steps + other.steps,
+            self.evaluations + other.evaluations,
+            self.linearizations + other.linearizations,
+        )
+
+
+@dataclass(frozen=True)
+class Stop:
+    """The time limit ended a search: after ``limit_s`` seconds, in a ``round`` (from 1) and a stage of `STAGES`.
+
+    ``causes``: labels of what had been found by then.
+    """
+
+    limit_s: float
+    round: int
+    stage: str
+    causes: tuple[str, ...]
+
+    @property
+    def words(self) -> str:
+        """One sentence for a reader of the verdict."""
+        return (
+            f"The search stopped at its time limit of {self.limit_s:g} s, in round {self.round} ({self.stage}), with "
+            f"{counted(len(self.causes), 'cause')} found: what else may be missing was not tried."
+        )
+
 
 @summarized
 @dataclass(frozen=True)
 class Trace:
     """Comparisons and moves in the order in which the search made them.
 
-    ``named``: what changed the probability of a cause once it was named. ``work``: what it cost.
+    ``named``: what changed the probability of a cause once it was named. ``work``: what it cost, ``work_by_stage``: by
+    the stages of `STAGES`. ``stopped``: where the time limit ended the search; None if it ended by itself.
     """
 
     comparisons: tuple[Comparison, ...] = ()
     steps: tuple[Step, ...] = ()
     named: tuple[Adjustment, ...] = ()
     work: Work = Work()
+    work_by_stage: Mapping[str, Work] = field(default_factory=dict)
+    stopped: Stop | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the trace as the verdict's JSON has it; removed hypotheses have null for nats."""

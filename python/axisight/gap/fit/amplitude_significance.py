@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import effect_info
 from axisight.gap.fit.fitted_model import FittedModel
-from axisight.gap.fit.held_out import step_without
+from axisight.gap.fit.held_out import steps_without_each
 from axisight.statistics.tails import log_fisher_tail
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ def amplitude_significance(fitted: FittedModel, stretch: NDArray[np.int64]) -> f
     groups = np.unique(stretch)
     if not columns or len(groups) < 2:
         return 0.0
-    moved = np.array([step_without(fitted, stretch == g)[columns] for g in groups])
+    moved = steps_without_each(fitted, stretch)[:, columns]
     # An amplitude that no re-fit moves is next to a bound. It is left out, like those on a bound.
     free = np.any(moved != 0.0, axis=0)
     if not free.any():

@@ -39,9 +39,9 @@ _KEPT: WeakKeyDictionary[FittedModel, WeakKeyDictionary[FittedModel, Array]] = W
 def _held_out_loss(fitted: FittedModel, groups: NDArray[np.int64]) -> Array:
     """Return the loss of every block (n_blocks,) predicted without its group, as a read-only array."""
     out = np.zeros(len(fitted.loss))
-    for group in np.unique(groups):
+    steps = straight_steps_without_each(fitted, groups)
+    for group, step in zip(np.unique(groups), steps, strict=True):
         inside = groups == group
-        step = straight_step_without(fitted, inside)
         out[inside] = predicted_loss(fitted, inside, step)
     out.flags.writeable = False
     return out
@@ -81,33 +81,43 @@ def _only_sources(fitted: FittedModel, number: NDArray[np.int64]) -> NDArray[np.
     return np.flatnonzero(every) if effects else np.zeros(0, dtype=np.int64)
 
 
-def step_without(fitted: FittedModel, inside: NDArray[np.bool_]) -> Array:
-    """Return the step of the parameters (n_parameters,) in a re-fit without the blocks ``inside``, to first order."""
-    step = _least_squares(fitted, inside, np.full(len(fitted.parameters), np.inf))
-    return step / max(1.0, _prior_lengths(fitted, step))
+def steps_without_each(fitted: FittedModel, groups: NDArray[np.int64]) -> Array:
+    """Return the steps of the parameters (n_groups, n_parameters) in re-fits without one group each, to first order.
+
+    ``groups`` (n_blocks,): the group of each block; rows are in the order of their numbers.
+    """
+    kept = _STEPS.setdefault(fitted, {})
+    key = groups.tobytes()
+    if key not in kept:
+        anywhere = np.full(len(fitted.parameters), np.inf)
+        kept[key] = _steps_without_each(fitted, groups, anywhere, anywhere)
+    return kept[key]
 
 
-def straight_step_without(fitted: FittedModel, inside: NDArray[np.bool_]) -> Array:
-    """Return the step of `step_without`, limited to the range where losses are predictable to second order.
+# Cache of these steps, by model and groups: every rule that asks how sure a number is needs them.
+_STEPS: WeakKeyDictionary[FittedModel, dict[bytes, Array]] = WeakKeyDictionary()
+
+
+def straight_steps_without_each(fitted: FittedModel, groups: NDArray[np.int64]) -> Array:
+    """Return the steps of `steps_without_each`, limited to where losses are predictable to second order.
 
     - A parameter that shapes a law moves by at most a tenth of its value; the others follow to their best values.
     - No parameter moves by more than the largest value of its effect in the same unit.
     """
     reach, size = np.full((2, len(fitted.parameters)), np.inf)
+    columns = {name: column for column, name in enumerate(fitted.parameters)}
     for place, effect in enumerate(fitted.effects):
         table = effect_info(effect.name).parameters
         values = dict(zip((p.name for p in table), effect.values(), strict=True))
         for p in table:
-            if (place, p.name) not in fitted.parameters:
+            column = columns.get((place, p.name))
+            if column is None:
                 continue
-            column = fitted.parameters.index((place, p.name))
             if p.role == "shape":
                 reach[column] = _STRAIGHT * abs(values[p.name])
             # If all values of a unit are zero, there is no size to limit the step.
             size[column] = max(abs(values[q.name]) for q in table if q.unit == p.unit) or np.inf
-    step = _least_squares(fitted, inside, reach)
-    lengths = float((np.abs(step) / size).max(initial=0.0))
-    return step / max(1.0, _prior_lengths(fitted, step), lengths)
+    return _steps_without_each(fitted, groups, reach, size)
 
 
 # Relative change of a shape parameter over which the law is about linear in it. For a wave over one turn of the angle,
@@ -115,13 +125,32 @@ def straight_step_without(fitted: FittedModel, inside: NDArray[np.bool_]) -> Arr
 _STRAIGHT = 0.1
 
 
-def _least_squares(fitted: FittedModel, inside: NDArray[np.bool_], reach: Array) -> Array:
-    """Return the step (n_parameters,) to the minimum without the blocks ``inside``, within ``reach`` by parameter."""
-    matrix = fitted.matrix[~inside].sum(axis=0) + fitted.prior_matrix
-    gradient = fitted.gradient[~inside].sum(axis=0) + fitted.prior_gradient
-    # Parameters that this part of the data does not determine keep their values.
-    matrix += np.diag(1e-9 * np.einsum("bii->i", fitted.matrix) + 1e-30)
+def _steps_without_each(
+    fitted: FittedModel, groups: NDArray[np.int64], reach: Array, size: Array
+) -> Array:
+    """Return the steps (n_groups, n_parameters) without each group, within ``reach`` and no longer than ``size``."""
+    names, place = np.unique(groups, return_inverse=True)
+    mine = [place == k for k in range(len(names))]
+    # Sums of the other groups; a difference of sums would round where one group has nearly everything.
+    others = 1.0 - np.eye(len(names))
+    matrices = np.tensordot(others, [fitted.matrix[k].sum(axis=0) for k in mine], 1)
+    gradients = others @ [fitted.gradient[k].sum(axis=0) for k in mine]
+    # Parameters that a part of the data does not determine keep their values.
+    ridge = np.diag(1e-9 * np.einsum("bii->i", fitted.matrix) + 1e-30)
     free = ~_pinned(fitted)
+    out = np.empty(gradients.shape)
+    for k, (matrix, gradient) in enumerate(zip(matrices, gradients, strict=True)):
+        step = _minimum(
+            matrix + fitted.prior_matrix + ridge, gradient + fitted.prior_gradient, free, reach
+        )
+        lengths = float((np.abs(step) / size).max(initial=0.0))
+        out[k] = step / max(1.0, _prior_lengths(fitted, step), lengths)
+    return out
+
+
+def _minimum(matrix: Array, gradient: Array, free: NDArray[np.bool_], reach: Array) -> Array:
+    """Return the step (n_parameters,) of the ``free`` parameters to the minimum, within ``reach`` by parameter."""
+    free = free.copy()
     step = np.zeros(len(gradient))
     while free.any():
         a = matrix[np.ix_(free, free)]
@@ -149,7 +178,8 @@ def _pinned(fitted: FittedModel) -> NDArray[np.bool_]:
     A step from a bound has only one direction. Where a law is steep, it would go too far.
     """
     influence = np.einsum("bii->i", fitted.matrix)
-    bound = np.array([n in fitted.at_bound or _next_to(fitted, n) for n in fitted.parameters])
+    at_bound = set(fitted.at_bound)
+    bound = np.array([n in at_bound or _next_to(fitted, n) for n in fitted.parameters])
     return np.asarray(bound | (influence <= 0))
 
 
@@ -170,7 +200,7 @@ def predictable(fitted: FittedModel) -> NDArray[np.bool_]:
 def predicted_loss(fitted: NormalEquations, blocks: NDArray[np.bool_], step: Array) -> Array:
     """Return the loss of some blocks after a parameter step, to second order."""
     loss = fitted.loss[blocks] + 2 * fitted.gradient[blocks] @ step
-    return np.asarray(loss + np.einsum("bij,i,j->b", fitted.matrix[blocks], step, step))
+    return np.asarray(loss + (fitted.matrix[blocks] @ step) @ step)
 
 
 def linear_gain(fitted: NormalEquations) -> float:
@@ -193,6 +223,17 @@ def linear_step(fitted: NormalEquations) -> Array:
     Bounds hold as in a fit. A change of an own parameter beyond its bound is an effect, and an effect cannot take
     values outside its range.
     """
+    known = _LINEAR.get(fitted)
+    if known is None:
+        known = _LINEAR[fitted] = _linear_step(fitted)
+    return known
+
+
+# Cache of linear steps: the gain of a step and its fall by block are asked for one after the other.
+_LINEAR: WeakKeyDictionary[NormalEquations, Array] = WeakKeyDictionary()
+
+
+def _linear_step(fitted: NormalEquations) -> Array:
     matrix = fitted.matrix.sum(axis=0) + fitted.prior_matrix
     gradient = fitted.gradient.sum(axis=0) + fitted.prior_gradient
     movable = (np.diag(matrix) > 0) & ~_at_hard_bound(fitted)
@@ -217,6 +258,7 @@ def linear_step(fitted: NormalEquations) -> Array:
         if not np.any(back > _SLIGHT):
             break
         free[np.argmax(back)] = True
+    step.flags.writeable = False
     return step
 
 

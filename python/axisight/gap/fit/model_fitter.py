@@ -23,6 +23,7 @@ from axisight.fitting import (
 from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis, NormalEquations
 from axisight.gap.fit.rank_deficiency import deviations_seen
+from axisight.gap.fit.time_limit import TimeLimit
 from axisight.gap.fit.work_count import WorkCount
 from axisight.gap.simulator.natural_sizes import NaturalSizes
 from axisight.gap.simulator.own_parameters import for_core
@@ -65,6 +66,7 @@ class ModelFitter(ABC):
         self.cancel = _core.CancelToken()
         # A fitter and all its copies share one count.
         self.work = WorkCount()
+        self.time_limit = TimeLimit.none()
         self.tolerances = tolerances
         self.natural: NaturalSizes | None = None
         self.own = [
@@ -134,6 +136,12 @@ class ModelFitter(ABC):
         """Return a copy for some of the logs, by their numbers; both share one cancellation."""
         other = copy(self)
         other._keep(logs)
+        return other
+
+    def until(self, limit: TimeLimit) -> ModelFitter:
+        """Return a copy that raises TimeUp once a time limit is reached, before a fit or an evaluation begins."""
+        other = copy(self)
+        other.time_limit = limit
         return other
 
     def within(self, tolerances: float) -> ModelFitter:
@@ -246,6 +254,7 @@ class ModelFitter(ABC):
         *,
         renewed: bool,
     ) -> FittedModel | Diverged:
+        self.time_limit.check()
         result = self.solve(*self._for_core(setup), options, setup.warm, near)
         if isinstance(result, Diverged):
             return result
@@ -297,6 +306,7 @@ class ModelFitter(ABC):
         ]
 
     def _evaluated(self, setup: _Setup, near: _core.Courses | None) -> NormalEquations | Diverged:
+        self.time_limit.check()
         options = self._options()
         result = self.linearize(*self._for_core(setup), options, setup.warm, near)
         if isinstance(result, Diverged):

@@ -1,32 +1,37 @@
-"""Counts the work of all fits of one diagnosis, on any thread."""
+"""Counts the work of all fits of one diagnosis by stage, on any thread."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from threading import Lock
 
 from axisight.gap.facts.trace import Work
 
 
 class WorkCount:
-    """Thread-safe count of work; ``done`` holds the sum so far."""
+    """Thread-safe count of work.
+
+    ``by_stage``: the sums so far, by the names of `axisight.gap.facts.trace.STAGES`; ``stage``: what counts now. Stages
+    follow one another, and all threads work on one stage.
+    """
 
     def __init__(self) -> None:
-        self.done = Work()
+        self.stage = "refit"
+        self.by_stage: dict[str, Work] = {}
         self._lock = Lock()
+
+    @property
+    def done(self) -> Work:
+        """The sum over all stages so far."""
+        return sum(self.by_stage.values(), Work())
 
     def fit(self, steps: int, evaluations: int) -> None:
         """Count a fit."""
-        with self._lock:
-            done = self.done
-            self.done = replace(
-                done,
-                fits=done.fits + 1,
-                steps=done.steps + steps,
-                evaluations=done.evaluations + evaluations,
-            )
+        self._add(Work(fits=1, steps=steps, evaluations=evaluations))
 
     def linearization(self) -> None:
         """Count a model that was evaluated with its sensitivities but not fitted."""
+        self._add(Work(linearizations=1))
+
+    def _add(self, work: Work) -> None:
         with self._lock:
-            self.done = replace(self.done, linearizations=self.done.linearizations + 1)
+            self.by_stage[self.stage] = self.by_stage.get(self.stage, Work()) + work

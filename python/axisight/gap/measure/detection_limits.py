@@ -38,8 +38,11 @@ def detection_limits(found: SearchState, view: View) -> tuple[DetectionLimit, ..
     """Return the limit of every effect that is no cause, at every place.
 
     It holds on the axis where the effect shows best, with all causes in the model. At the limit a gap is detected. To
-    tell the effect from its look-alikes may need a larger amplitude.
+    tell the effect from its look-alikes may need a larger amplitude. None for a search that its time limit stopped: it
+    might have found larger ones, too.
     """
+    if found.stopped is not None:
+        return ()
     named = {e.label for e in found.model.effects}
     known = {**found.sensitivities, **_not_tried(found, view)}
     kept = [s for label, s in known.items() if label not in named]

@@ -21,7 +21,7 @@ from axisight.effects import Effect, effect_info
 from axisight.effects.friction_curves import rise_over_high_speed
 from axisight.effects.relations import Plainer
 from axisight.gap.fit.fitted_model import FittedModel
-from axisight.gap.fit.held_out import step_without
+from axisight.gap.fit.held_out import steps_without_each
 
 Array = NDArray[np.float64]
 
@@ -73,6 +73,6 @@ def own_error(fitted: FittedModel, name: str, stretch: NDArray[np.int64]) -> flo
     if not known or size == 0 or len(groups) < 2:
         return float("inf")
     column = fitted.parameters.index(key)
-    moved = np.array([step_without(fitted, stretch == g)[column] for g in groups])
+    moved = steps_without_each(fitted, stretch)[:, column]
     error = np.sqrt((len(groups) - 1) / len(groups) * float(moved @ moved))
     return float(error / size)

@@ -81,7 +81,9 @@ class Bordered:
         every = slice(None) if n == len(model.parameters) else kept
         matrix[:, :n, :n] = model.matrix[:, every][:, :, every]
         gradient[:, :n] = model.gradient[:, every]
-        for block in np.flatnonzero(self._followed):
+        # Most candidates act on one axis: their columns are zero in the blocks of the others.
+        acts = np.logical_or.reduceat(new.any(axis=0), model.start)
+        for block in np.flatnonzero(self._followed & acts):
             rows = slice(model.start[block], model.start[block] + model.size[block])
             here = new[:, rows]
             border = self._rows[:, rows] @ here.T

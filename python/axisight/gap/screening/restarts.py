@@ -92,9 +92,19 @@ class Restarts:
     def _with_better(
         self, trials: Sequence[FittedHypothesis], begun: Sequence[Restart]
     ) -> list[FittedHypothesis]:
-        """Fit restarts; add those that are new, and replace those that fit better than before."""
+        """Fit restarts; add those that are new, and replace those that fit better than before.
+
+        Of several starts of one hypothesis, only the one that ends best is evaluated on all data.
+        """
         known = {t.label: t for t in trials}
-        for found in self.pool.map(lambda one: self._fitted(*one), self._promising(begun)):
+        chosen = self._promising(begun)
+        ended = self.pool.map(lambda one: self._begun(*one), chosen)
+        best: dict[str, tuple[Hypothesis, FittedModel]] = {}
+        for (_, option, _), fit in zip(chosen, ended, strict=True):
+            label = option.effect.label
+            if fit is not None and (label not in best or fit.total < best[label][1].total):
+                best[label] = option, fit
+        for found in self.pool.map(lambda one: self._ended(*one), best.values()):
             if found is not None:
                 before = known.get(found.label)
                 if before is None or found.fitted.total < before.fitted.total:
@@ -137,19 +147,27 @@ class Restarts:
                 known |= {t.label: t for t in found}
         return list(known.values())
 
-    def _fitted(
+    def _begun(
         self, leader: FittedModel, option: Hypothesis, values: Mapping[str, float]
-    ) -> FittedHypothesis | None:
-        """Return a trial fitted in the place of a leader, from the leader's values; None if it cannot be simulated."""
+    ) -> FittedModel | None:
+        """Return a fit in the place of a leader, from its values, to the data of the screen; None if it diverges."""
         here = self.round
         part = here.rough or here.fitter
         free = [*leader.free[:-1], option]
         found = part.fit(free, leader, robot_values=values, refreshes=RENEWALS)
         if not isinstance(found, Diverged):
             found = settled(part, found.free, found)
-        if part is not here.fitter and not isinstance(found, Diverged):
-            found = here.looked_at(found)
+        return self._held(found, option.effect.label)
+
+    def _ended(self, option: Hypothesis, begun: FittedModel) -> FittedHypothesis | None:
+        """Return a fit to the data of the screen as a trial on all data; None if it diverges there."""
+        here = self.round
+        all_data = here.rough is None
+        found = begun if all_data else self._held(here.looked_at(begun), option.effect.label)
+        return None if found is None else trial(option, found, here.model)
+
+    def _held(self, found: FittedModel | Diverged, label: str) -> FittedModel | None:
         if isinstance(found, Diverged):
-            here.skipped.setdefault(option.effect.label, str(found))
+            self.round.skipped.setdefault(label, str(found))
             return None
-        return trial(option, found, here.model)
+        return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -20,6 +21,7 @@ from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.sensitivity import Sensitivity
 from axisight.gap.fit.settling import has_settled, settled
+from axisight.gap.fit.time_limit import TimeUp
 from axisight.gap.fit.tolerance_edges import BENT, bent
 from axisight.gap.ranking.clear_lead import CLOSE, clear
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, falls, trial
@@ -123,6 +125,8 @@ class SearchRound:
         self.usual: set[str] = set()
         self.done: set[str] = set()
         self.sensitivities: dict[str, Sensitivity] = {}
+        # The last trials that were judged, and their posteriors.
+        self._stood: tuple[list[FittedHypothesis], list[AxisPosterior]] = [], []
 
     @property
     def rough(self) -> ModelFitter | None:
@@ -146,11 +150,13 @@ class SearchRound:
         tryout = TrialFit(self.bench, self.screen)
         if any(tryout.bends(start) for start in chosen):
             self.bench.begin_nominal()
+        self.fitter.work.stage = "fitting"
         with self._threads() as pool:
             found = self._fitted_by_place(pool, chosen, f"fitting candidates, round {number}")
             return self._with_look_alikes(pool, found, options)
 
     def _screened(self, options: Sequence[Hypothesis], number: int) -> list[Start]:
+        self.fitter.work.stage = "screening"
         screen = thinned(self.bench, self.current - self.floor, self.layout, self.kept)
         self.screen = screen
         if any(option.starts and len(option.free) == 1 for option in options):
@@ -224,6 +230,7 @@ class SearchRound:
         chosen, self.waiting = self.waiting, []
         if not chosen:
             return trials
+        self.fitter.work.stage = "fitting"
         with self._threads() as pool:
             found = self._with_look_alikes(pool, [*trials, *self._fitted(pool, chosen)], options)
         self.progress(f"fitting further candidates, round {number}", len(chosen), len(chosen))
@@ -235,6 +242,10 @@ class SearchRound:
         with ThreadPoolExecutor(self.settings.threads) as pool:
             try:
                 yield pool
+            except TimeUp:
+                # What has begun ends; nothing else begins.
+                pool.shutdown(wait=True, cancel_futures=True)
+                raise
             except BaseException:
                 self.fitter.cancel.cancel()
                 pool.shutdown(wait=True, cancel_futures=True)
@@ -294,6 +305,12 @@ class SearchRound:
 
     def standings(self, trials: Sequence[FittedHypothesis]) -> list[AxisPosterior]:
         """Return the posteriors of the trials, for each axis that one of them improves."""
+        # They are asked for again and again, mostly for the same trials.
+        if not same(self._stood[0], trials):
+            self._stood = list(trials), self._standings(trials)
+        return list(self._stood[1])
+
+    def _standings(self, trials: Sequence[FittedHypothesis]) -> list[AxisPosterior]:
         found = [
             stand(
                 trials,
@@ -323,6 +340,7 @@ class SearchRound:
         the strongest effect, too.
         """
         label = f"refining the leaders, round {number}"
+        self.fitter.work.stage = "refining"
         with self._threads() as pool:
             while todo := self._refined_next(trials, even_felt=even_felt):
                 self.progress(label, len(self.done), len(self.done) + len(todo))
@@ -486,6 +504,11 @@ class SearchRound:
             out.append(value)
             self.progress(label, k + 1, len(items))
         return out
+
+
+def same(these: Sequence[object], others: Sequence[object]) -> bool:
+    """Whether two sequences hold the same objects in the same order."""
+    return len(these) == len(others) and all(map(operator.is_, these, others))
 
 
 def interact(one: int, other: int, axis: int, fall: Array) -> bool:

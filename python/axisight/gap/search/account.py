@@ -20,7 +20,7 @@ def trace_of(found: SearchState) -> Trace:
         for number, one in enumerate(found.rounds, start=1)
         for standing in _as_judged(one)
     )
-    return Trace(tuple(comparisons), tuple(found.steps))
+    return Trace(tuple(comparisons), tuple(found.steps), stopped=found.stopped)
 
 
 def _as_judged(one: Round) -> Iterator[AxisPosterior]:

@@ -139,7 +139,11 @@ class _Contest:
         """Return an alternative fitted beside the rest; None if it diverges or contains an effect of the rest."""
         if len(kept_beside(rest, one.hypothesis)) < len(rest):
             return None
-        found = self.fitter.fit([*rest, one.hypothesis], one.start or self.without, lazy=True)
+        # Sensitivities of a start hold for its own values only.
+        start, beside = (
+            (self.without, self.without.free) if one.start is None else (one.start, rest)
+        )
+        found = self.fitter.fit([*beside, one.hypothesis], start, lazy=True)
         return None if isinstance(found, Diverged) else trial(one.hypothesis, found)
 
     def standing(self, trials: Sequence[FittedHypothesis]) -> AxisPosterior | None:

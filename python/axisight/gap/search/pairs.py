@@ -61,6 +61,8 @@ class Pairs:
     ) -> None:
         self.fitter, self.model, self.trials, self.current = fitter, model, trials, current
         self.floor, self.layout, self.settings = floor, layout, settings
+        # Fits of pairs by the labels of their members, in order.
+        self._fits: dict[tuple[str, str], FittedHypothesis | None] = {}
 
     def found(self, axis: int, first: float, tried: int) -> Pair | None:
         """Return the pair that explains most of ``axis`` (from 0); None if it is not significant.
@@ -129,8 +131,11 @@ class Pairs:
 
     def _both(self, one: FittedHypothesis, other: FittedHypothesis) -> FittedHypothesis | None:
         """Return ``other`` fitted on top of the model with ``one``; None if it diverges."""
-        free = [*one.fitted.free, other.hypothesis]
-        return fitted_with(self.fitter, free, one.fitted, lazy=True)
+        key = one.label, other.label
+        if key not in self._fits:
+            free = [*one.fitted.free, other.hypothesis]
+            self._fits[key] = fitted_with(self.fitter, free, one.fitted, lazy=True)
+        return self._fits[key]
 
     def _beside(
         self, one: str, partner: str, mine: Sequence[FittedHypothesis], axis: int

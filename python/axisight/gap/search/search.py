@@ -10,18 +10,20 @@ from numpy.typing import NDArray
 
 from axisight.fitting.divergence import Diverged, must_hold
 from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.trace import Stop
 from axisight.gap.fit.data_blocks import layout_of
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.settling import settled
+from axisight.gap.fit.time_limit import TimeLimit, TimeUp
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, falls
 from axisight.gap.ranking.likelihood import FORMULA_ERROR
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.screening.column_cache import ColumnCache
 from axisight.gap.screening.promise import HOPELESS
 from axisight.gap.screening.screening import kept_beside
-from axisight.gap.screening.search_round import Progress, SearchRound, fresh, interact
+from axisight.gap.screening.search_round import Progress, SearchRound, fresh, interact, same
 from axisight.gap.search.composites import named_simply
 from axisight.gap.search.contest import Context
 from axisight.gap.search.moves import AFTER_EACH_ROUND, AT_THE_END, finish, make
@@ -42,16 +44,41 @@ def search(
     expected: Array,
     settings: Settings,
     progress: Progress,
+    limit: TimeLimit,
     baseline: FittedModel | None = None,
 ) -> SearchState:
     """Search for the causes of a gap.
 
     ``candidates``: makes the hypotheses from the residual of a model; ``expected`` (n_axes,): mean square of the
-    weighted residual of noise alone. ``baseline``: the re-fitted simulator, if it is there already.
+    weighted residual of noise alone. ``limit``: where it ends the search, the causes of finished rounds stay.
+    ``baseline``: the re-fitted simulator, if it is there already.
     """
     baseline = baseline or refitted(fitter, progress)
     floor = expected[baseline.axis] * baseline.samples
     out = SearchState(baseline, baseline, floor, layout_of(baseline), adds_up=fitter.adds_up)
+    limited = fitter.until(limit)
+    try:
+        _add_causes(limited, candidates, out, settings, progress)
+        limited.work.stage = "moves"
+        make(AT_THE_END, Context(limited, out, settings, last=out.rounds[-1].standings))
+        finish(limited, out)
+    except TimeUp:
+        # A round that was cut short adds nothing: its leaders have not met all their rivals.
+        causes = tuple(f.effect.label for f in out.model.free)
+        out.stopped = Stop(limit.limit_s, out.number, limited.work.stage, causes)
+        out.rounds = out.rounds or [Round((), (), out.left())]
+    fitter.work.stage = "measuring"
+    return out
+
+
+def _add_causes(
+    fitter: ModelFitter,
+    candidates: Callable[[FittedModel], list[Hypothesis]],
+    out: SearchState,
+    settings: Settings,
+    progress: Progress,
+) -> None:
+    """Add causes round by round until a round finds none."""
     refused: set[str] = set()
     kept = ColumnCache()
 
@@ -59,11 +86,12 @@ def search(
         return fresh(candidates(model), model, refused)
 
     for number in range(1, _MOST_ROUNDS + 1):
+        out.number = number
         least = out.least_falls(settings)
         round_ = SearchRound(
             fitter,
             out.model,
-            floor,
+            out.floor,
             out.layout,
             least,
             settings,
@@ -78,31 +106,34 @@ def search(
         standings, taken = _judged(round_, trials, out, settings, len(options))
         if round_.first(standings, trials) not in {r.trial.label for r, _ in taken}:
             # The leader that others waited for is no cause.
+            before = trials
             trials = round_.run_waiting(trials, options, number)
             trials = round_.refined(trials, options, number, even_felt=True)
-            standings, taken = _judged(round_, trials, out, settings, len(options))
+            if not same(trials, before):
+                standings, taken = _judged(round_, trials, out, settings, len(options))
         out.skipped |= round_.skipped
         out.sensitivities |= round_.sensitivities
-        out.rounds.append(Round(standings, taken, out.left()))
+        # The round has its causes once they are in the model.
+        out.rounds.append(Round(standings, (), out.left()))
         if not taken:
             break
         diverged = _take_in(round_, out, taken, progress)
+        out.rounds[-1] = replace(out.rounds[-1], accepted=taken)
         if diverged is not None:
             # Together they diverge: refuse the first, which promised most.
             refused.add(taken[0][0].trial.label)
             out.skipped[taken[0][0].trial.label] = str(diverged)
             continue
+        fitter.work.stage = "moves"
         refused |= make(AFTER_EACH_ROUND, Context(fitter, out, settings, offered))
         if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
             break
-    make(AT_THE_END, Context(fitter, out, settings, last=out.rounds[-1].standings))
-    finish(fitter, out)
-    return out
 
 
 def refitted(fitter: ModelFitter, progress: Progress) -> FittedModel:
     """Return the re-fitted simulator without effects. The first halves of the logs are fitted first, for speed."""
     progress("re-fitting the simulator", 0, 1)
+    fitter.work.stage = "refit"
     halves = fitter.beginnings()
     if halves is None:
         out = must_hold(fitter.fit([], refreshes=1))
@@ -120,6 +151,7 @@ def _judged(
     tried: int,
 ) -> tuple[tuple[AxisPosterior, ...], tuple[tuple[RankedHypothesis, AxisPosterior], ...]]:
     """Return the posterior of every axis, and the causes to add, at most up to ``settings.max_causes``."""
+    round_.fitter.work.stage = "judging"
     standings = tuple(round_.standings(trials))
     taken = _taken(round_, trials, standings, state, settings, tried)
     room = settings.max_causes - len(state.model.free)
@@ -294,6 +326,7 @@ def _take_in(
     """Add causes to the model; return how it diverges with them, else None."""
     label = "adding " + ", ".join(r.trial.label for r, _ in taken)
     progress(label, 0, 1)
+    round_.fitter.work.stage = "adding"
     start = taken[0][0].trial.fitted
     # If only one of a pair fits in `max_causes`, its trial holds both: fit it again without the other.
     if len(taken) == 1 and len(start.free) <= len(state.model.free) + 1:

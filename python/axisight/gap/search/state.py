@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
 from axisight.gap.facts.settings import Settings
-from axisight.gap.facts.trace import Step
+from axisight.gap.facts.trace import Step, Stop
 from axisight.gap.fit.data_blocks import Layout
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.held_out import held_out_loss, predictable
@@ -45,6 +45,8 @@ class SearchState:
     - ``skipped``: candidates that failed, with the reason.
     - ``sensitivities`` by label, from the last screening of each candidate.
     - ``steps``: what each move changed.
+    - ``number``: the round that is under way, from 1.
+    - ``stopped``: where the time limit ended the search; None if it ended by itself.
     - ``adds_up``: whether the errors of the axes add up; ``by_axis``: whether causes explain single axes, not the arm.
     """
 
@@ -56,6 +58,8 @@ class SearchState:
     skipped: dict[str, str] = field(default_factory=dict)
     sensitivities: dict[str, Sensitivity] = field(default_factory=dict)
     steps: list[Step] = field(default_factory=list)
+    number: int = 1
+    stopped: Stop | None = None
     adds_up: bool = False
     by_axis: bool = False
 

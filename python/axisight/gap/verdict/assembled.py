@@ -107,6 +107,7 @@ def assembled(
                 joints=robot.axis_names,
                 mode=view.mode,
                 apart=_apart(reach),
+                stopped=found.stopped,
             )
         ),
         gap=gap,
@@ -143,6 +144,7 @@ def assembled(
             trace_of(found),
             named=(*(x for c in conclusion.causes for x in c.ledger), *conclusion.ledger),
             work=view.fitter.work.done,
+            work_by_stage=dict(view.fitter.work.by_stage),
         ),
         provenance=_provenance(robot, view, names, settings),
     )

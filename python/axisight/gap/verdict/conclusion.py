@@ -128,6 +128,7 @@ class Conclusion:
 _ALTERNATIVES = 5
 # Probability of a cause that the controller's law shows. A limit of the supply, say, looks like one of the drive.
 _SHOWN = 0.99
+_MORE_TIME = "Diagnose again with a longer time limit (`--time-limit`)."
 
 
 def conclude(
@@ -141,7 +142,7 @@ def conclude(
 
     ``stands_out``: whether the plain torque error of the re-fitted simulator lies above the noise. Otherwise
     an unexplained residual counts as noise of an unexpected colour, up to what noise can be. ``shown``: causes
-    that the logs show by themselves; they come first.
+    that the logs show by themselves; they come first. A gap is *unknown* where the time limit stopped the search.
     """
     accepted = found.accepted
     explained = found.explained()
@@ -166,6 +167,11 @@ def conclude(
     else:
         verdict = "undecidable" if open_groups else "explained"
     believed = verdict in ("explained", "undecidable") or found.by_axis
+    if found.stopped is not None and verdict != "none":
+        # What was found is named; nobody looked for what else there is.
+        verdict = "unknown"
+        if strongest is None:
+            p_none, p_unknown = 0.0, 1.0
     searched = [_named(r, s, i, found.model, labels) for i, (r, s) in enumerate(accepted)]
     causes, effects = with_torque_sensors(
         (*map(named_shown, shown), *searched) if believed else (),
@@ -178,6 +184,8 @@ def conclude(
     causes = tuple(c.adjusted("either", 0.5) if c.label in torn else c for c in causes)
     open_groups += gains
     advice = advice_unknown() if verdict == "unknown" else None
+    if found.stopped is not None and verdict == "unknown":
+        advice = _MORE_TIME
     if verdict == "undecidable":
         advice = separating_experiment(open_groups[0])
     named = {c.label for c in causes}
@@ -364,6 +372,9 @@ def _checks(found: SearchState, settings: Settings, explained: float) -> tuple[s
         f"re-fitted, {left:.3f} with the causes (1 is noise plus {100 * settings.model_error:g} % model error).",
         f"Share of the explainable error removed on held-out estimation data: {100 * explained:.1f} %.",
     ]
+    if found.stopped is not None:
+        by_then = ", ".join(found.stopped.causes) or "none"
+        out.append(f"{found.stopped.words} Causes of finished rounds: {by_then}.")
     out += [f"Candidate {k} could not be tried: {v}" for k, v in sorted(found.skipped.items())]
     return tuple(out)
 

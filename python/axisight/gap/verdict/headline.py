@@ -22,6 +22,7 @@ from axisight.gap.facts.result import (
     VerdictKind,
     Where,
 )
+from axisight.gap.facts.trace import Stop
 from axisight.gap.facts.withdrawal import Withdrawal
 from axisight.gap.facts.wording import listed, percent
 from axisight.gap.verdict.cause_words import (
@@ -63,7 +64,7 @@ class Facts:
     the same logs; ``withdrawn``: how the validation logs contradict the estimation logs. ``where`` the gap
     lies and the ``remainder`` with the causes in. ``own``: effects of the simulator; ``refit``: relative change
     of its own parameters [1]; ``joints``: names of its axes. ``mode``: how torques were predicted. ``apart``: by how
-    much two runs of a machine that chatters differ [1].
+    much two runs of a machine that chatters differ [1]. ``stopped``: where the time limit ended the search.
     """
 
     verdict: VerdictKind
@@ -80,6 +81,7 @@ class Facts:
     joints: Sequence[str] = ()
     mode: Mode = "closed_loop"
     apart: float | None = None
+    stopped: Stop | None = None
 
     @property
     def n_axes(self) -> int:
@@ -98,6 +100,7 @@ def headline(facts: Facts) -> str:
         said = _unknown(facts)
     else:
         said = _explained(facts)
+    said = said if facts.stopped is None else [facts.stopped.words, *said]
     text = with_joints(" ".join(x for x in said if x), facts.joints)
     log = "" if facts.withdrawn is None else facts.withdrawn.log or ""
     return text.replace(_LOG, log)
@@ -151,10 +154,7 @@ def _none(facts: Facts) -> list[str]:
             f"Re-fitted{how}, they leave {left} there (noise alone: {noise}).",
         ]
     else:
-        out.append(
-            f"The re-fitted simulator leaves {percent(gap.refitted)} of the {_torque(facts)} on validation logs "
-            f"(noise alone: {percent(gap.floor)})."
-        )
+        out.append(_refitted(facts))
     loud = [i for i, x in enumerate(gap.floor_per_axis.tolist(), start=1) if hides_all(x)]
     if loud:
         most = percent(float(max(gap.floor_per_axis)))
@@ -164,6 +164,14 @@ def _none(facts: Facts) -> list[str]:
             else f"Noise hides much on {place(loud, facts.n_axes)}: it is up to {most} of the {_torque(facts)} there."
         )
     return out
+
+
+def _refitted(facts: Facts) -> str:
+    gap = facts.gap
+    return (
+        f"The re-fitted simulator leaves {percent(gap.refitted)} of the {_torque(facts)} on validation logs "
+        f"(noise alone: {percent(gap.floor)})."
+    )
 
 
 def _explained(facts: Facts) -> list[str]:
@@ -325,6 +333,9 @@ def _unknown(facts: Facts) -> list[str]:
     out = []
     if facts.causes:
         out = [_sure(facts), _open(facts), _effect_in_part(facts)]
+    if facts.stopped is not None:
+        # Nobody knows yet what explains the rest.
+        return [*out, "" if facts.causes else _refitted(facts), _contradiction(facts)]
     return [*out, _gap_left(facts), _contradiction(facts)]
 
 

@@ -9,7 +9,7 @@ import scipy
 from axisight.effects import Effect
 from axisight.gap.fit.amplitude_significance import amplitude_significance
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
-from axisight.gap.fit.held_out import step_without as _step
+from axisight.gap.fit.held_out import steps_without_each as _steps
 from axisight.gap.measure.by_axis import OwnAxes
 from axisight.gap.measure.gap_figures import Stage
 from gap_data import linear_evidence
@@ -66,8 +66,8 @@ def test_an_amplitude_that_no_stretch_moves_is_left_out(monkeypatch):
     alone = viscous(column, column + noise)
     want = amplitude_significance(alone, STRETCH)
     monkeypatch.setattr(
-        "axisight.gap.fit.amplitude_significance.step_without",
-        lambda found, inside: 0.0 * _step(found, inside),
+        "axisight.gap.fit.amplitude_significance.steps_without_each",
+        lambda found, groups: 0.0 * _steps(found, groups),
     )
     assert want > 5 and amplitude_significance(alone, STRETCH) == 0.0
 

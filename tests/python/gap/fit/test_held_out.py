@@ -12,8 +12,8 @@ from axisight.gap.fit.held_out import (
     held_out_loss,
     linear_gain,
     linear_step,
-    step_without,
-    straight_step_without,
+    steps_without_each,
+    straight_steps_without_each,
 )
 from axisight.gap.ranking.fitted_hypothesis import trial
 from gap_data import linear_evidence
@@ -183,11 +183,11 @@ def told_by_one_log():
     found = linear_evidence(x, y, log)
     names = ((0, "coulomb_nm"), (0, "smoothing_rad_s"))
 
-    def step(down: float = 5e-3, size: float = 1.0, take=straight_step_without) -> np.ndarray:
+    def step(down: float = 5e-3, size: float = 1.0, take=straight_steps_without_each) -> np.ndarray:
         effect = Effect("coulomb_friction", 1, {"coulomb_nm": size, "smoothing_rad_s": 0.01})
         room = {names[0]: (-1.0, 9.0), names[1]: (-down, 1.0)}
         one = replace(found, effects=(effect,), parameters=names, room=room)
-        return take(one, one.log == 1)
+        return take(one, one.log)[1]
 
     return x[log == 0], y[log == 0], np.linalg.lstsq(x, y, rcond=None)[0], step
 
@@ -203,7 +203,7 @@ def test_a_step_takes_the_shape_of_a_law_no_further_than_its_law_is_straight(tol
     # The ridge against singular matrices is 1e-9 of the diagonal.
     assert moved[0] == pytest.approx(x[:, 0] @ rest / (x[:, 0] @ x[:, 0]), rel=1e-5)
     # Where the step itself is asked for, as by how sure a shape is, it goes all the way.
-    assert step(take=step_without) == pytest.approx(free, rel=1e-4)
+    assert step(take=steps_without_each) == pytest.approx(free, rel=1e-4)
 
 
 def test_a_step_takes_an_effect_no_further_than_it_is_large(told_by_one_log):

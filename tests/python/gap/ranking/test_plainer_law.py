@@ -111,7 +111,8 @@ def test_a_cable_that_does_not_stretch_is_a_constant_torque(slack, monkeypatch):
     ]
     # A stretch left out takes a hundredth of the stiffness along.
     monkeypatch.setattr(
-        "axisight.gap.ranking.plainer_law.step_without", lambda *_: np.array([0.05])
+        "axisight.gap.ranking.plainer_law.steps_without_each",
+        lambda *_: np.array([[0.05], [0.05]]),
     )
     found = held_to_plainer(tried, fits, np.array([0.0, 1.0, -9.0]), np.array([0, 0, 1]))
     assert found == pytest.approx([0.0, -np.log(50.0) if slack else 1.0, -9.0])

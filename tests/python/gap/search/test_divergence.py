@@ -6,6 +6,7 @@ import pytest
 from axisight import Effect, InputError, Settings
 from axisight.fitting.divergence import Diverged, must_hold
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
+from axisight.gap.fit.time_limit import TimeLimit
 from axisight.gap.screening.screening import ScreeningModel
 from axisight.gap.search.search import search
 from axisight.gap.views.closed_loop import ClosedLoopView
@@ -41,7 +42,14 @@ def test_a_search_does_not_pass_over_misuse():
         return [*view.candidates(found), MISPLACED]
 
     with pytest.raises(InputError, match=r"torque_offset.*an axis from 1 to 1, got axis 7"):
-        search(view.fitter, candidates, view.floor.expected, view.settings, lambda *_: None)
+        search(
+            view.fitter,
+            candidates,
+            view.floor.expected,
+            view.settings,
+            lambda *_: None,
+            TimeLimit.none(),
+        )
 
 
 def test_misuse_comes_through_a_screen(view: ClosedLoopView, model: FittedModel):

@@ -134,7 +134,7 @@ def test_a_leader_that_cannot_be_simulated_anew_leaves_the_field_to_others(monke
     field.settings = Settings()
     field.bench = SimpleNamespace(skipped={})
     field.screen = SimpleNamespace(bench=field.bench)
-    field.fitter = field.model = None
+    field.fitter, field.model = SimpleNamespace(work=SimpleNamespace()), None
     field.done = set()
     monkeypatch.setattr(search_round, "settled", settled)
     monkeypatch.setattr(search_round, "trial", lambda candidate, fitted, model: other)
