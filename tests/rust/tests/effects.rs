@@ -407,6 +407,7 @@ fn work_forth_and_back(kernel: &dyn Kernel<f64>, load: f64) -> [f64; 2] {
         let motor = Motor {
             angle: amplitude * sine,
             speed: amplitude * rate * cosine,
+            acceleration: 0.0,
             command: 0.0,
             load,
             internal: &internal,
