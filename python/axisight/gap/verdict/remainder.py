@@ -11,6 +11,7 @@ from axisight.gap.facts.result import Gap, Remainder, Where
 from axisight.gap.facts.settings import Settings
 from axisight.gap.facts.wording import percent
 from axisight.gap.measure.gap_figures import Stages
+from axisight.gap.measure.other_axes import axis_followed
 from axisight.gap.measure.where import AT_REVERSALS, ErrorLog, band_map, placed, regime_maps
 from axisight.gap.verdict.carry_over import above_floor
 
@@ -49,10 +50,15 @@ def remainder_of(
         ),
         key=lambda w: -w.share,
     )
-    regime = where[0].regime
-    return Remainder(
-        total, per_axis, tuple(where), None if regime is None else regime.partition(":")[0]
-    )
+    return Remainder(total, per_axis, tuple(where), _followed(where[0], logs, settings))
+
+
+def _followed(first: Where, logs: Sequence[ErrorLog], settings: Settings) -> str | None:
+    """Return what the remainder at its first place varies with: a regime, the speed of another axis, both or none."""
+    other = axis_followed(logs, first.axis - 1, settings)
+    regime = "" if first.regime is None else first.regime.partition(":")[0]
+    speed = "" if other is None else f"the speed of axis {other + 1}"
+    return " and ".join(filter(None, [regime, speed])) or None
 
 
 def reversals_smeared(
