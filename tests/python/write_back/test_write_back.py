@@ -124,7 +124,7 @@ def test_a_robot_file_has_place_for_all(tmp_path: Path):
 
 HEAVIER = several("link_mass", 1, relative_change=0.2)
 ASIDE = several("link_com", 2, x_m=0.02, y_m=-0.01, z_m=0.03)
-LOAD = several("payload", None, mass_kg=1.5, x_m=0.1, y_m=0.05, z_m=-0.2)
+LOAD = several("payload", None, mass_kg=1.5, x_m=0.1, y_m=0.05, z_m=-0.2, gyration_m2=0.04)
 BULKIER = several("link_inertia", 2, relative_change=0.4)
 LONGER = several("link_geometry", 1, x_m=0.03, y_m=-0.02, z_m=0.01)
 ZEROS = [several("joint_zero_offset", axis, offset_rad=0.1 * axis) for axis in (1, 2)]
