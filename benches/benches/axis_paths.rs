@@ -95,7 +95,7 @@ fn through_plant<S: Scalar>(robot: &RobotDescription, torque: &[f64]) -> Respons
         place: Place::Axis(0),
         parameters,
     };
-    let friction = vec![value(6), S::constant(SMOOTHING), S::constant(0.0)];
+    let friction = [value(6), S::constant(SMOOTHING), S::zero(), S::zero()].to_vec();
     let settings = [
         effect("nonlinear_stiffness", vec![value(3)]),
         effect("coulomb_friction", friction),

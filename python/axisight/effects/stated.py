@@ -93,6 +93,9 @@ DRY_FRICTION = ("coulomb_friction", "coulomb_nm", "smoothing_rad_s")
 BEHIND_GEAR = "arm_share"
 """Parameter of friction laws without memory: the share that acts on the arm, behind an elastic gear."""
 
+LEAD = "lead_s"
+"""Parameter of dry friction: time by which it acts ahead of the speed, as in simulators with soft constraints."""
+
 BRISTLES = ("presliding_friction", "presliding_rad", "relaxation_s")
 """Dry friction that yields before it slips: effect, displacement before slip, relaxation time in fits.
 

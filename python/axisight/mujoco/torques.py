@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
 from axisight.effects import Effect, core_effects, effect_info
-from axisight.effects.stated import WITH_MEMORY
+from axisight.effects.stated import LEAD, WITH_MEMORY
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Weighting
 from axisight.fitting.divergence import must_hold
@@ -65,6 +65,8 @@ def _why_none(effect: Effect) -> str:
         return "it acts between two axes"
     if effect.name in WITH_MEMORY:
         return "it has a memory, and a torque of the moment has none"
+    if (effect.parameters or {}).get(LEAD, 0.0) > 0:
+        return "it acts ahead of the speed as MuJoCo's own: write it into the model, write_back.write_model"
     if (info.stands_for or ("",))[0] == "motor_inertia":
         return "it is an armature: write it into the model, write_back.write_model"
     return _INSTEAD.get(info.acts, "")

@@ -86,6 +86,8 @@ class Drive:
     - ``gear_ratio`` r: joint angle per motor angle [1, or m/rad]
     - ``rotor_inertia``: inertia of the rotor reflected to the joint [kg m^2]
     - ``damping`` [Nm s/rad], ``friction``: dry friction [Nm]
+    - ``friction_corner_rad_s``: speed over which dry friction changes sign; ``friction_lead_s``: by how much it
+      acts ahead of the speed
     - ``spring`` [Nm/rad]: a spring that pulls the joint to ``spring_rest_rad`` [rad]
     - ``servo``: gains on position [Nm/rad] and speed [Nm s/rad] of an actuator with position targets,
       motor-side
@@ -103,6 +105,8 @@ class Drive:
     rotor_inertia: float = 0.0
     damping: float = 0.0
     friction: float = 0.0
+    friction_corner_rad_s: float = 0.01
+    friction_lead_s: float = 0.0
     spring: float = 0.0
     spring_rest_rad: float = 0.0
     servo: tuple[float, float] | None = None

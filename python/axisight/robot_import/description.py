@@ -8,10 +8,12 @@ import numpy as np
 import tomlkit
 
 from axisight.arguments import shown
+from axisight.effects import effect_info
 from axisight.effects.stated import (
     DRY_FRICTION,
     JOINT_SPRING,
     LAG,
+    LEAD,
     TORQUE_CONSTANT,
     TORQUE_LIMIT,
     TRANSPORT_DELAY,
@@ -24,8 +26,6 @@ from axisight.robot_import.drives import DriveData, JointDrive, Payload
 
 # Usual in simulators for such files; logs and drive data may state another.
 DEFAULT_SAMPLE_TIME_S = 1e-3
-# Speed over which dry friction changes sign, joint-side; model files do not state it.
-_SMOOTHING_RAD_S = 0.01
 
 
 def description(chain: Chain, drives: DriveData, source: str) -> str:
@@ -43,13 +43,11 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
     joints = list(chain.joints)
     last = _loaded(joints[-1].mass, drives.payload, chain.end)
     tables, effects = [], []
-    friction, moment, corner = DRY_FRICTION
     for number, joint in enumerate(joints, start=1):
         drive = drives.joint.get(joint.body.joint, JointDrive())
         mass = last if joint is joints[-1] else joint.mass
         table, ratio = _joint(joint, mass, drive)
         tables.append(table)
-        dry = _dry_friction(joint, drive, ratio)
         spring = joint.body.drive.spring
         if spring > 0:
             effects.append(
@@ -61,15 +59,7 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
                 }
             )
         effects += _torque_path(joint.body.drive, number, ratio)
-        if dry > 0:
-            effects.append(
-                {
-                    "name": friction,
-                    "axis": number,
-                    moment: dry,
-                    corner: _SMOOTHING_RAD_S / abs(ratio),
-                }
-            )
+        effects += _dry_friction(joint.body.drive, drive.coulomb_friction, number, ratio)
     document: dict[str, Any] = {
         "schema": "axisight.robot/2",
         "name": chain.name,
@@ -251,11 +241,24 @@ def _torque_path(drive: Drive, axis: int, ratio: float) -> list[dict[str, Any]]:
     ]
 
 
-def _dry_friction(joint: ChainJoint, drive: JointDrive, ratio: float) -> float:
-    """Return the dry friction of a joint, motor-side [Nm]."""
-    if drive.coulomb_friction is not None:
-        return drive.coulomb_friction
-    return joint.body.drive.friction * abs(ratio)
+def _dry_friction(
+    drive: Drive, measured_nm: float | None, axis: int, ratio: float
+) -> list[dict[str, Any]]:
+    """Return the dry friction of an axis (from 1) as effects: none or one.
+
+    ``measured_nm``: dry friction in drive data, motor-side. It replaces that of the file and its law.
+    """
+    friction, moment, corner = DRY_FRICTION
+    law = drive if measured_nm is None else Drive()
+    nm = drive.friction * abs(ratio) if measured_nm is None else measured_nm
+    if nm <= 0:
+        return []
+    found: dict[str, Any] = {"name": friction, "axis": axis, moment: nm}
+    bounds = next(p for p in effect_info(friction).parameters if p.name == corner)
+    found[corner] = min(max(law.friction_corner_rad_s / abs(ratio), bounds.lower), bounds.upper)
+    if law.friction_lead_s > 0:
+        found[LEAD] = law.friction_lead_s
+    return [found]
 
 
 def _loaded(mass: Mass | None, payload: Payload | None, end: Pose) -> Mass | None:

@@ -30,6 +30,9 @@ from axisight.robot_import.xml_tree import Element
 
 Array = NDArray[np.float64]
 
+# Smallest and largest impedance of a constraint; MuJoCo clips others to it.
+_IMPEDANCES = (1e-4, 1.0 - 1e-4)
+
 
 def read_mjcf(root: Element, path: Path) -> Tree:
     """Return the bodies of an MJCF file as MuJoCo compiles it; ``root`` is its root element.
@@ -173,6 +176,7 @@ class _Compiled:
                 float(model.dof_armature[dof]) + rotor,
                 float(model.dof_damping[dof]) + damper,
                 float(model.dof_frictionloss[dof]),
+                *self._friction_law(dof),
                 float(model.jnt_stiffness[j]),
                 float(model.qpos_spring[model.jnt_qposadr[j]]),
                 actuators.servos().get(j),
@@ -201,6 +205,28 @@ class _Compiled:
             bare=bare,
             of=body,
         )
+
+    def _friction_law(self, dof: int) -> tuple[float, float]:
+        """Return corner [rad/s] and lead [s] of MuJoCo's friction on a degree of freedom, joint-side.
+
+        MuJoCo's friction f of at most F is a soft constraint. Below F it makes a + b v = -R f, with speed v and
+        acceleration a. With the inverse inertia A and the acceleration a0 = a - A f without friction that is
+        f = -clip((a0 + b v) / (A + R), -F, F). So it changes sign with v + a0 / b, over the corner F (A + R) / b.
+        ``solref`` gives b. A is taken at the initial pose, as in R = A (1 - d) / d, with the impedance d at the
+        beginning of ``solimp``. A constraint without damping stops nothing: then the usual corner, and no lead.
+        """
+        model = self.model
+        least, most = np.clip(model.dof_solimp[dof][:2], *_IMPEDANCES)
+        time, damping = model.dof_solref[dof]
+        if time > 0:
+            safe = not model.opt.disableflags & self.mujoco.mjtDisableBit.mjDSBL_REFSAFE
+            damping = -2.0 / max(time, 2.0 * model.opt.timestep if safe else 0.0)
+        if damping >= 0:
+            return Drive.friction_corner_rad_s, Drive.friction_lead_s
+        impedance = least if model.dof_solimp[dof][2] > 0 else 0.5 * (least + most)
+        lead = most / -damping
+        corner = model.dof_frictionloss[dof] * model.dof_invweight0[dof] / impedance * lead
+        return float(corner), float(lead)
 
     def _mass(self, i: int) -> Mass | None:
         model = self.model

@@ -95,7 +95,8 @@ def _with(mass: Mass, effect: str, values: Mapping[str, float]) -> Mass:
     if effect == LINK_COM:
         return replace(mass, com_m=mass.com_m + place)
     if effect == LOAD:
-        load = Mass(values["mass_kg"], place, np.zeros((3, 3)))
+        mass_kg = values["mass_kg"]
+        load = Mass(mass_kg, place, mass_kg * values.get("gyration_m2", 0.0) * np.eye(3))
         found = _body(_sums(mass) + _sums(load))
         return mass if found is None else found
     factor = 1 + values["relative_change"]

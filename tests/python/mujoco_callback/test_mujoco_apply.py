@@ -88,6 +88,15 @@ def test_what_is_no_torque_is_refused(name: str):
         check_applicable([Effect(name, **place)], 2)
 
 
+def test_mujocos_own_friction_is_refused():
+    """It acts on the acceleration, and MuJoCo has it as a number of the joint."""
+    friction = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5, "lead_s": 0.0095})
+    with pytest.raises(InputError, match="ahead of the speed as MuJoCo's own"):
+        check_applicable([friction], 3)
+    check_applicable([friction.with_values({"lead_s": 0.0})], 3)
+
+
+
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory: pytest.TempPathFactory) -> Robot:
     """A rigid arm: a gear of fifty in the shoulder, of ten in the elbow."""

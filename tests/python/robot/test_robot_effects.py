@@ -78,6 +78,7 @@ def test_presets_state_their_effects() -> None:
         "coulomb_nm": 0.644,
         "smoothing_rad_s": 0.01,
         "arm_share": 0.0,
+        "lead_s": 0.0,
     }
 
 

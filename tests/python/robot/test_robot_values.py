@@ -178,6 +178,7 @@ def test_values_of_an_axis_fit_stand_where_they_belong(tmp_path: Path) -> None:
         "coulomb_nm": fit.parameters["F_c"],
         "smoothing_rad_s": 0.01,
         "arm_share": 0.0,
+        "lead_s": 0.0,
     }
     order = [fit.free.index(n) for n in ("J_m", "k1", "k3", "d", "F_v", "F_c")]
     np.testing.assert_allclose(back.covariance, fit.sandwich[np.ix_(order, order)], rtol=1e-9)

@@ -26,7 +26,7 @@ const LOGS: [(usize, f64); 5] = [
     (330, -20.0),
 ];
 /// Level and smoothing of the friction in the model; the level is a parameter.
-const FRICTION: [f64; 3] = [0.5, 2.0, 0.0];
+const FRICTION: [f64; 4] = [0.5, 2.0, 0.0, 0.0];
 
 /// A parameter, and a change of it that a search makes in one go.
 const CHANGES: [(Target, f64); 6] = [

@@ -78,7 +78,7 @@ fn a_model_without_a_run_is_no_misuse() {
 
 #[test]
 fn misuse_of_effects_is_no_divergence() {
-    let (friction, good) = ("coulomb_friction", [0.4, 0.5, 0.0]);
+    let (friction, good) = ("coulomb_friction", [0.4, 0.5, 0.0, 0.0]);
     for misused in [
         effect(friction, Some(7), &good),
         effect(friction, None, &good),
@@ -97,7 +97,7 @@ fn a_fit_tells_them_apart_where_it_begins() {
     stiff.parameters[0].initial = 1e14;
     let begun = |p: &SimulationErrorProblem| fit(p, &p.parameters, FitOptions::default(), &[]);
     divergence(begun(&stiff).expect_err("diverges"));
-    let misused = effect("coulomb_friction", Some(7), &[0.4, 0.5, 0.0]);
+    let misused = effect("coulomb_friction", Some(7), &[0.4, 0.5, 0.0, 0.0]);
     let mut misplaced = problem(vec![misused], STIFFNESS);
     misplaced.parameters[0].initial = 4e5;
     assert!(is_misuse(&begun(&misplaced).expect_err("misplaced")));
@@ -126,7 +126,7 @@ fn predicted_torques_tell_them_apart() {
             .expect_err("holds nowhere near")
     };
     divergence(predicted(Vec::new(), -1.0));
-    let misplaced = effect("coulomb_friction", Some(7), &[0.4, 0.5, 0.0]);
+    let misplaced = effect("coulomb_friction", Some(7), &[0.4, 0.5, 0.0, 0.0]);
     assert!(is_misuse(&predicted(vec![misplaced], 60.0)));
 }
 

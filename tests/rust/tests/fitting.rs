@@ -21,7 +21,7 @@ const TRUTH: [f64; 4] = [4e5, 0.004, 60.0, 0.4];
 const SCALE: [f64; 4] = [1e4, 1e-4, 1.0, 0.1];
 
 fn friction(level: f64) -> Vec<EffectSetting<f64>> {
-    vec![effect("coulomb_friction", Some(0), &[level, 0.5, 0.0])]
+    vec![effect("coulomb_friction", Some(0), &[level, 0.5, 0.0, 0.0])]
 }
 
 /// Torque that holds the arm plus sines.

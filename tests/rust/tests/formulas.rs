@@ -292,16 +292,20 @@ fn a_deadband_takes_its_width_off_every_torque() {
 /// `r` times that of the joint. Power too: what both take is what the whole takes.
 #[test]
 fn a_share_of_friction_acts_behind_the_gear() {
-    let laws: [(&str, &[f64]); 4] = [
-        ("coulomb_friction", &[0.5, 0.1]),
-        ("asymmetric_friction", &[0.5, 0.3, 0.1]),
-        ("stribeck_friction", &[0.5, 0.3, 3.0, 0.1]),
-        ("position_dependent_friction", &[0.5, -0.2, 0.01, 0.1, 0.6]),
+    let laws: [(&str, &[f64], &[f64]); 4] = [
+        ("coulomb_friction", &[0.5, 0.1], &[0.0]),
+        ("asymmetric_friction", &[0.5, 0.3, 0.1], &[]),
+        ("stribeck_friction", &[0.5, 0.3, 3.0, 0.1], &[]),
+        (
+            "position_dependent_friction",
+            &[0.5, -0.2, 0.01, 0.1, 0.6],
+            &[],
+        ),
     ];
     let ratio = -1.0 / 120.0;
-    for (name, values) in laws {
+    for (name, values, after) in laws {
         let kernel_with = |share: f64| {
-            let p = [values, &[share]].concat();
+            let p = [values, &[share], after].concat();
             build::<f64>(name, &p).expect("in the table")
         };
         for (angle, speed) in [(0.3, 4.0), (40.0, 0.05), (-130.0, -0.02), (300.0, -20.0)] {
@@ -310,6 +314,7 @@ fn a_share_of_friction_acts_behind_the_gear() {
                 let motor = kernel.motor_torque(&Motor {
                     angle,
                     speed,
+                    acceleration: 0.0,
                     command: 0.0,
                     load: 0.0,
                     internal: &[],
@@ -335,6 +340,33 @@ fn a_share_of_friction_acts_behind_the_gear() {
     }
 }
 
+/// Friction with a lead acts on the speed that far ahead, and is exactly its level beyond its width.
+#[test]
+fn friction_with_a_lead_acts_on_the_speed_ahead() {
+    let (level, width, lead) = (0.5, 0.2, 0.01);
+    let with = |lead: f64| build::<f64>("coulomb_friction", &[level, width, 0.0, lead]);
+    let (ahead, plain) = (with(lead).expect("known"), with(0.0).expect("known"));
+    assert!(ahead.needs_acceleration() && !plain.needs_acceleration());
+    for (speed, acceleration, sign) in [
+        (0.3, 0.0, 1.0),
+        (0.3, -60.0, -1.0),
+        (0.3, -20.0, 0.5),
+        (0.0, 5.0, 0.25),
+        (-0.3, 20.0, -0.5),
+    ] {
+        let torque = ahead.motor_torque(&Motor {
+            angle: 0.0,
+            speed,
+            acceleration,
+            command: 0.0,
+            load: 0.0,
+            internal: &[],
+        });
+        let off = (torque + level * sign).abs();
+        assert!(off < 1e-15, "{speed} {acceleration}: {torque}");
+    }
+}
+
 #[test]
 fn friction_of_a_place_is_a_wave_over_the_angle() {
     let p = [0.5, -0.2, 0.01, 0.1, 0.6, 0.0];
@@ -343,6 +375,7 @@ fn friction_of_a_place_is_a_wave_over_the_angle() {
         let motor = Motor {
             angle,
             speed,
+            acceleration: 0.0,
             command: 0.0,
             load: 0.0,
             internal: &[],
@@ -562,6 +595,7 @@ fn warming_friction_follows_its_own_clock() {
         let motor = Motor {
             angle: 1.0,
             speed: 20.0,
+            acceleration: 0.0,
             command: 0.0,
             load: 0.0,
             internal: &internal,

@@ -431,7 +431,7 @@ fn unstable_gain_diverges() {
 fn misuse_is_refused_by_name() {
     let robot = robot(PRESET);
     for (name, parameters) in [
-        ("coulomb_friction", vec![0.5, 0.5, 0.0]),
+        ("coulomb_friction", vec![0.5, 0.5, 0.0, 0.0]),
         ("backlash", vec![1e-4, 0.0]),
         ("quadratic_drag", vec![1e-3]),
         (

@@ -13,7 +13,7 @@ type C = Complex<f64>;
 fn settings() -> Vec<EffectSetting<f64>> {
     vec![
         effect("nonlinear_stiffness", Some(1), &[2e11]),
-        effect("coulomb_friction", Some(0), &[0.5, 0.5, 0.0]),
+        effect("coulomb_friction", Some(0), &[0.5, 0.5, 0.0, 0.0]),
         effect(
             "torque_ripple",
             Some(2),

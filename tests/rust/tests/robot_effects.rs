@@ -32,12 +32,12 @@ fn effects_and_tolerances_are_read() {
             name: "coulomb_friction".to_owned(),
             place: Place::Axis(1),
             // What the file leaves out has its usual value.
-            parameters: vec![0.41, 0.1, 0.0],
+            parameters: vec![0.41, 0.1, 0.0, 0.0],
         },
         EffectSetting {
             name: "payload".to_owned(),
             place: Place::Arm,
-            parameters: vec![12.0, 1.0, 0.0, 0.2],
+            parameters: vec![12.0, 1.0, 0.0, 0.2, 0.0],
         },
     ];
     assert_eq!(robot.effects, expected);
@@ -71,7 +71,7 @@ fn effects_of_the_file_act_and_are_replaced() {
         let method = Method::RungeKutta4 { substeps: 1 };
         trace(plant, &bare, Drive::Reference(&[&reference]), &[], method).command
     };
-    let friction = |level| effect("coulomb_friction", Some(1), &[level, 0.1, 0.0]);
+    let friction = |level| effect("coulomb_friction", Some(1), &[level, 0.1, 0.0, 0.0]);
     let without = run(&plant(&bare, &[]));
     let stated = run(&plant(&own, &[]));
     assert_ne!(stated, without);

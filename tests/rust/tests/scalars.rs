@@ -32,7 +32,7 @@ fn settings<S: Scalar>() -> Vec<EffectSetting<S>> {
         effect("input_delay", Some(2), &[0.7e-3]),
         effect("actuator_bandwidth", Some(1), &[1e-3]),
         effect("torque_constant", Some(1), &[0.05]),
-        effect("payload", None, &[20.0, 1.0, 0.0, 0.2]),
+        effect("payload", None, &[20.0, 1.0, 0.0, 0.2, 0.0]),
     ]
 }
 

@@ -13,7 +13,7 @@ const SAMPLES: usize = 800;
 const COULOMB_NM: f64 = 0.4;
 
 fn friction(level: f64) -> Vec<EffectSetting<f64>> {
-    vec![effect("coulomb_friction", Some(0), &[level, 0.5, 0.0])]
+    vec![effect("coulomb_friction", Some(0), &[level, 0.5, 0.0, 0.0])]
 }
 
 /// A motion of the arm known in closed form, and the torque it takes.

@@ -6,6 +6,7 @@
 //! other models share are in [`formulas`].
 
 mod harmonics;
+mod lead;
 mod sides;
 
 pub use axisight_plant::effect::{

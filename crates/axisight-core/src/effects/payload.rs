@@ -1,4 +1,4 @@
-//! A point mass on the last link that carries mass.
+//! A load on the last link that carries mass.
 
 use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, Mark, ParameterInfo, PlantParameters, Role, Scales, Scope};
 use crate::robot::Body;
@@ -21,7 +21,7 @@ const fn coordinate(name: &'static str, neutral: f64) -> ParameterInfo {
 pub(super) static INFO: EffectInfo = EffectInfo {
     name: "payload",
     summary: "the tool or load is heavier (or lighter) than modelled",
-    equation: "point mass m at p on the last link",
+    equation: "mass m at p on the last link, with the inertia m k^2 about every axis through p",
     source: "Swevers, Verdonck, De Schutter (2007), IEEE Control Systems 27(5), payload as a rigid body",
     scope: Scope::Arm,
     acts: Acts::Arm,
@@ -45,6 +45,18 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         coordinate("x_m", 1.0),
         coordinate("y_m", 0.0),
         coordinate("z_m", 0.2),
+        // A tool spreads about alike in all directions: one number says how far.
+        ParameterInfo {
+            name: "gyration_m2",
+            unit: "m^2 (squared radius of gyration)",
+            role: Role::Shape,
+            lower: 0.0,
+            upper: 1.0,
+            typical: 0.01,
+            marks: &[Mark::Optional],
+            sizes: "judgement: tools are about 0.1 m large",
+            ..ParameterInfo::PLAIN
+        },
     ],
     ..EffectInfo::PLAIN
 };
@@ -52,12 +64,14 @@ pub(super) static INFO: EffectInfo = EffectInfo {
 struct Payload<S> {
     mass: S,
     position: [S; 3],
+    gyration: S,
 }
 
 pub(super) fn kernel<S: Scalar>(p: &[S]) -> Box<dyn Kernel<S>> {
     Box::new(Payload {
         mass: p[0],
         position: [p[1], p[2], p[3]],
+        gyration: p[4],
     })
 }
 
@@ -70,16 +84,16 @@ impl<S: Scalar> Kernel<S> for Payload<S> {
             .rev()
             .find_map(|j| j.body.as_mut());
         if let Some(body) = last {
-            *body = combined(body, self.mass, &self.position);
+            *body = combined(body, self);
         }
     }
 }
 
-/// A body with a point mass attached (parallel-axis theorem).
-fn combined<S: Scalar>(body: &Body<S>, mass: S, position: &[S; 3]) -> Body<S> {
-    let total = body.mass + mass;
-    let share = mass / total;
-    let arm: [S; 3] = std::array::from_fn(|i| position[i] - body.com[i]);
+/// A body with a load attached (parallel-axis theorem).
+fn combined<S: Scalar>(body: &Body<S>, load: &Payload<S>) -> Body<S> {
+    let total = body.mass + load.mass;
+    let share = load.mass / total;
+    let arm: [S; 3] = std::array::from_fn(|i| load.position[i] - body.com[i]);
     // Reduced mass of body and payload; zero without a payload.
     let reduced = body.mass * share;
     let [x, y, z] = arm;
@@ -91,9 +105,13 @@ fn combined<S: Scalar>(body: &Body<S>, mass: S, position: &[S; 3]) -> Body<S> {
         -(x * z),
         -(y * z),
     ];
+    let own = load.mass * load.gyration;
     Body {
         mass: total,
         com: std::array::from_fn(|i| body.com[i] + share * arm[i]),
-        inertia: std::array::from_fn(|i| body.inertia[i] + reduced * spread[i]),
+        inertia: std::array::from_fn(|i| {
+            let about_itself = if i < 3 { own } else { S::zero() };
+            body.inertia[i] + reduced * spread[i] + about_itself
+        }),
     }
 }

@@ -307,6 +307,7 @@ mod tests {
         Motor {
             angle,
             speed,
+            acceleration: 0.0,
             command: 0.0,
             load: 0.0,
             internal: &[],
@@ -329,7 +330,7 @@ mod tests {
             theta[layout().stribeck_speed()] = 1.7;
         });
         let stribeck = kernel("stribeck_friction", &[0.64, 0.27, 1.7, SMOOTHING, 0.0]);
-        let coulomb = kernel("coulomb_friction", &[0.64, SMOOTHING, 0.0]);
+        let coulomb = kernel("coulomb_friction", &[0.64, SMOOTHING, 0.0, 0.0]);
         for speed in sweep() {
             let own = chain.friction::<true>(speed, Regime::Smooth);
             assert_same(own, -stribeck.motor_torque(&motor(0.0, speed)));

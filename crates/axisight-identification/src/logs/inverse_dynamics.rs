@@ -432,6 +432,7 @@ fn drive<S: Scalar>(
     let motor = Motor {
         angle,
         speed,
+        acceleration: at(&record.acceleration),
         command: at(&record.torque),
         load: joint_force * axis.ratio,
         internal: &[],

@@ -10,6 +10,9 @@ pub struct Motor<'a, S> {
     pub angle: S,
     /// Motor speed [rad/s].
     pub speed: S,
+    /// Motor acceleration [rad/s^2]: that of a measured motion, or, for effects that need it, the
+    /// acceleration without them. Zero for all others.
+    pub acceleration: S,
     /// Commanded torque of the sample, u [Nm].
     pub command: S,
     /// Gear torque on the motor, motor side [Nm]; zero for a rigid transmission.
@@ -221,6 +224,10 @@ pub trait Kernel<S: Scalar>: Send + Sync {
     /// Torque added on the motor shaft [Nm]; friction is negative for positive speed.
     fn motor_torque(&self, _motor: &Motor<'_, S>) -> S {
         S::zero()
+    }
+    /// Whether [`Kernel::motor_torque`] depends on the acceleration.
+    fn needs_acceleration(&self) -> bool {
+        false
     }
     /// Whether [`Kernel::motor_torque`] depends on the command.
     fn uses_command(&self) -> bool {

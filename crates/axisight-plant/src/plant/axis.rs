@@ -45,6 +45,8 @@ pub struct Axis<S> {
     /// All effects on this axis.
     pub kernels: Vec<Arc<dyn Kernel<S>>>,
     pub(super) on_motor: Vec<Own<S>>,
+    /// Effects on the motor that need its acceleration without them.
+    pub(super) ahead: Vec<Arc<dyn Kernel<S>>>,
     pub(super) on_gear: Vec<Own<S>>,
     pub(super) on_joint: Vec<Own<S>>,
     /// Axes whose motors also turn this gear.
@@ -102,6 +104,12 @@ impl<S: Scalar> Axis<S> {
             }
         }
         torque
+    }
+
+    /// Torque on the motor [Nm] of the effects that need its acceleration; `at` gives it.
+    pub(super) fn torque_ahead(&self, at: &Motor<S>) -> S {
+        let torques = self.ahead.iter().map(|kernel| kernel.motor_torque(at));
+        torques.fold(S::zero(), |a, b| a + b)
     }
 
     /// Torque of the gear [Nm, joint side] at the deflection `delta` [rad] and its rate `rate`
@@ -240,6 +248,7 @@ pub(super) fn axes<S: Scalar>(
                 gear,
                 kernels: Vec::new(),
                 on_motor: Vec::new(),
+                ahead: Vec::new(),
                 on_gear: Vec::new(),
                 on_joint: Vec::new(),
                 led_by: Vec::new(),

@@ -232,6 +232,7 @@ impl<S: Scalar> Plant<S> {
             axis.on_joint.push(own.clone());
         }
         match info.acts {
+            Acts::Motor if own.kernel.needs_acceleration() => axis.ahead.push(own.kernel),
             Acts::Motor => axis.on_motor.push(own),
             Acts::Transmission => axis.on_gear.push(own),
             Acts::Joint => axis.on_joint.push(own),

@@ -194,6 +194,9 @@ impl<S: Scalar> Plant<S> {
         for (joint, stiffness, damping) in &self.elastic {
             force[*joint] -= stiffness.fma(q[*joint], *damping * v[*joint]);
         }
+        if self.axes.iter().any(|axis| !axis.ahead.is_empty()) {
+            self.act_ahead(x, command, scratch, &mut place[m + n..]);
+        }
         self.dynamics.solve(scratch);
         place[m + n + m..].copy_from_slice(&scratch.forces()[..n]);
     }
@@ -203,7 +206,7 @@ impl<S: Scalar> Plant<S> {
     pub fn torque_acts_on_motors_alone(&self) -> bool {
         self.axes.iter().all(|axis| {
             let plain = |on: &Own<S>| !on.kernel.uses_command();
-            axis.gear.is_some() && axis.on_motor.iter().all(plain)
+            axis.gear.is_some() && axis.ahead.is_empty() && axis.on_motor.iter().all(plain)
         })
     }
 
@@ -234,11 +237,13 @@ impl<S: Scalar> Plant<S> {
         self.dynamics.factorize(scratch);
     }
 
-    /// Torque that effects add on each motor in state `x` [Nm].
+    /// Torque that effects add on each motor in state `x` [Nm]. Those that need the acceleration act
+    /// as at a constant speed.
     pub fn motor_disturbances(&self, x: &[S], command: &[S], out: &mut [S]) {
         for ((axis, command), out) in self.axes.iter().zip(command).zip(out.iter_mut()) {
             let free = self.driven(axis, x, S::zero(), *command, &mut []).motor;
             *out = free + axis.viscous_friction * self.motor_speed(axis, x);
+            *out += axis.torque_ahead(&self.motor_state(axis, x, S::zero(), *command));
         }
         self.each_reaction(x, |first, torque| out[first] -= torque);
         for pair in &self.on_pairs {
@@ -292,6 +297,7 @@ impl<S: Scalar> Plant<S> {
             let state = Motor {
                 angle,
                 speed,
+                acceleration: S::zero(),
                 command,
                 load,
                 internal: &[],
@@ -337,6 +343,50 @@ impl<S: Scalar> Plant<S> {
             accelerations[gear.slot] -= torque * axis.inverse_motor_inertia;
         } else {
             force[axis.joint] -= torque * (1.0 / axis.ratio);
+        }
+    }
+
+    /// Add the torques on motors that depend on the acceleration without them. Each axis counts the
+    /// torques of the others as they are without these effects.
+    #[inline(never)]
+    fn act_ahead(
+        &self,
+        x: &[S],
+        command: &[S],
+        scratch: &mut DynamicsScratch<S>,
+        accelerations: &mut [S],
+    ) {
+        let mut force = scratch.forces().to_vec();
+        let rigid = |axis: &Axis<S>| axis.gear.is_none() && !axis.ahead.is_empty();
+        if self.axes.iter().any(rigid) {
+            self.dynamics.solve(scratch);
+        }
+        for (i, (axis, command)) in self.axes.iter().zip(command).enumerate() {
+            let free = match &axis.gear {
+                Some(gear) => accelerations[gear.slot],
+                None => scratch.forces()[axis.joint] * (1.0 / axis.ratio),
+            };
+            let torque = axis.torque_ahead(&self.motor_state(axis, x, free, *command));
+            self.hold_back(i, -torque, &mut force, accelerations);
+        }
+        scratch.forces().copy_from_slice(&force);
+    }
+
+    /// State of a motor with an acceleration, and without the load of its gear.
+    fn motor_state(
+        &self,
+        axis: &Axis<S>,
+        x: &[S],
+        acceleration: S,
+        command: S,
+    ) -> Motor<'static, S> {
+        Motor {
+            angle: self.motor_angle(axis, x),
+            speed: self.motor_speed(axis, x),
+            acceleration,
+            command,
+            load: S::zero(),
+            internal: &[],
         }
     }
 

@@ -41,6 +41,7 @@ MEANINGS: dict[str, str] = {
     "quantized_velocity": "a velocity has few distinct values",
     "quantized_velocity_ref": "a velocity reference has few distinct values",
     "quantized_joint_position": "a position measured on the joint has few distinct values",
+    "gear_gives_way": "encoders on motor and joint show a gear that deflects otherwise than the simulator's",
     "position_noise_large": "a position has far more noise than the robot file states",
     "log_repeated": "two estimation logs, or two validation logs, have the same content",
     "validation_copies_estimation": "a validation log shares rows with an estimation log",

@@ -159,7 +159,8 @@ class Remainder:
     ``gap``: sqrt(after^2 - floor^2) [1], zero where only noise is left; ``per_axis``: the same by
     axis, (n_axes,). ``where``: the places above the floor, with shares of the squared
     remainder; empty where no axis is above it. ``varies_with``: the variable that it follows at the
-    first place (``speed``, ``direction``, ``position``, ``acceleration``, ``load`` or ``time``), if any.
+    first place (``speed``, ``direction``, ``position``, ``acceleration``, ``load`` or ``time``, or ``the speed of
+    axis`` and its number), if any.
     """
 
     gap: float

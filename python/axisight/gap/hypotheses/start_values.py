@@ -12,11 +12,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects.stated import BEHIND_GEAR, BRISTLES, PLAY
+from axisight.effects.stated import BEHIND_GEAR, PLAY
 from axisight.gap.fit.fitted_model import Hypothesis
+from axisight.gap.hypotheses.friction_starts import (
+    SMOOTHING,
+    TURNS_SLOWLY,
+    dry_law,
+    presliding,
+    stribeck,
+)
 from axisight.gap.hypotheses.friction_waves import wave_of_friction
 from axisight.gap.hypotheses.ripple_orders import passed, strongest_orders
 from axisight.gap.hypotheses.start_context import StartContext, StartData
+from axisight.gap.signals.both_encoders import play_rad
 from axisight.gap.signals.lowpass_cutoff import rigid_below_hz
 from axisight.robot import Robot
 
@@ -33,60 +41,6 @@ def _neutral(trial: StartContext) -> Hypothesis:
 def _not_last_link(trial: StartContext) -> Hypothesis | None:
     """Start at the neutral values; None for the last axis, whose link carries no further axis."""
     return _neutral(trial) if trial.index + 1 < trial.robot.n_axes else None
-
-
-def _law(**shares: float) -> Callable[[StartContext], Hypothesis]:
-    """Return starts at neutral values, also behind the gear; shape speeds are ``shares`` of the axis's top speed."""
-
-    def start(trial: StartContext) -> Hypothesis:
-        top = max(float(np.abs(x[trial.index].speed_rad_s).max()) for x in trial.at.turning) or 1.0
-        found = {name: share * top for name, share in shares.items()}
-        values = {p.name: p.neutral for p in trial.info.parameters} | found
-        # All laws of dry friction may turn equally sharply.
-        bounds = {k: (0.1 * min(v, _SMOOTHING * top), 10 * v) for k, v in found.items()}
-        starts = ({BEHIND_GEAR: 1.0},) if BEHIND_GEAR in values else ()
-        return Hypothesis(trial.effect(values), tuple(values), bounds=bounds, starts=starts)
-
-    return start
-
-
-# Shares of top speed: the smoothing of dry friction around zero speed, and the Stribeck speed.
-_SMOOTHING, _STRIBECK = 0.003, 0.1
-# Further starts of the Stribeck speed, as shares of the top speed: 0.001 to 0.1 by grease and load; more if slow.
-_STRIBECK_STARTS = (0.003, 0.01, 0.03, 0.3)
-
-
-def _stribeck(trial: StartContext) -> Hypothesis:
-    """Start as a friction law with several Stribeck speeds; a fit does not move over decades of speed."""
-    name = "stribeck_speed_rad_s"
-    begin = _law(smoothing_rad_s=_SMOOTHING, **{name: _STRIBECK})(trial)
-    speed = float((begin.effect.parameters or {})[name])
-    starts = tuple(
-        {name: share / _STRIBECK * speed, **side}
-        for share in _STRIBECK_STARTS
-        for side in ({}, *begin.starts)
-    )
-    bounds = {**begin.bounds, name: (0.1 * starts[0][name], 10 * speed)}
-    return replace(begin, bounds=bounds, starts=starts)
-
-
-# Pre-sliding distances as shares of the motor's travel: shorter ones look like dry friction, longer ones like a spring.
-_YIELDING = (3e-4, 1.5e-3, 6e-3)
-
-
-def _presliding(trial: StartContext) -> Hypothesis:
-    """Start with several pre-sliding distances, no break-away torque, and a relaxation time of one sample."""
-    _, way, relaxation = BRISTLES
-    travel = max(float(np.ptp(x[trial.index].angle_rad)) for x in trial.at.turning)
-    starts = tuple({way: share * max(travel, 1e-3)} for share in _YIELDING)
-    values = {p.name: p.neutral for p in trial.info.parameters} | starts[1]
-    values[relaxation] = trial.robot.sample_time_s
-    return Hypothesis(
-        trial.effect(values),
-        ("coulomb_nm", way, "bristle_time_s"),
-        bounds={way: (0.5 * starts[0][way], 5 * starts[-1][way]), "bristle_time_s": (0.0, 0.1)},
-        starts=(starts[0], starts[2]),
-    )
 
 
 # Smallest number of waves over the travel of an axis, and of a slide; a longer wave could have any shape.
@@ -182,7 +136,8 @@ def _play(trial: StartContext) -> Hypothesis:
 
     From 4 % of the deflection under the torque's standard deviation to 80 % of it, or on a rotating axis to the
     largest half-width of industrial gears. Some starts have teeth that rebound, some teeth that grease stops. The
-    damping in the gap is fitted later; see `screening.restart_gear_law`.
+    damping in the gap is fitted later; see `screening.restart_gear_law`. Where encoders on motor and joint show wider
+    play, it starts at that width, with the damping free.
     """
     i, deflection = trial.index, _bent_rad(trial)
     begin = replace(_of_a_gear(trial), free=("half_width_rad",))
@@ -193,6 +148,10 @@ def _play(trial: StartContext) -> Hypothesis:
         widest = max(widest, _WIDEST_RAD)
     count = 1 + round(np.log(widest / (0.04 * deflection)) / np.log(_WIDER))
     widths = np.geomspace(0.04 * deflection, widest, count)
+    if (seen := play_rad(trial.logs, trial.robot, i)) > widest:
+        near = {"half_width_rad": (0.5 * seen, 2.0 * seen)}
+        slowed = tuple({"half_width_rad": seen, PLAY[1]: s} for s in (1.0, 0.1, 0.01))
+        return replace(begin, free=("half_width_rad", PLAY[1]), bounds=near, starts=slowed)
     rebounding = [{"half_width_rad": float(w), PLAY[1]: 0.0} for w in widths]
     stopped = [{"half_width_rad": float(w), PLAY[1]: 1.0} for w in widths[::2]]
     return replace(begin, starts=(*rebounding, *stopped))
@@ -401,7 +360,7 @@ def _uneven(trial: StartContext) -> Hypothesis | None:
         return None
     order, cosine, sine = wave
     # Without a wave, its order has no gradient. Half of the friction behind the gear lets a fit move it to either side.
-    begin = _law(smoothing_rad_s=_SMOOTHING)(trial).at(
+    begin = dry_law(smoothing_rad_s=SMOOTHING)(trial).at(
         {
             "order": order,
             "cosine_nm": _BEGUN * cosine,
@@ -513,10 +472,10 @@ def _read_late(trial: StartContext) -> Hypothesis | None:
 
 STARTS: Mapping[str, Callable[[StartContext], Hypothesis | None]] = {
     "viscous_friction": _neutral,
-    "coulomb_friction": _law(smoothing_rad_s=_SMOOTHING),
-    "asymmetric_friction": _law(smoothing_rad_s=_SMOOTHING),
-    "stribeck_friction": _stribeck,
-    "presliding_friction": _presliding,
+    "coulomb_friction": dry_law(smoothing_rad_s=SMOOTHING),
+    "asymmetric_friction": dry_law(smoothing_rad_s=SMOOTHING),
+    "stribeck_friction": stribeck,
+    "presliding_friction": presliding,
     "backlash": _play,
     "nonlinear_stiffness": _hardening,
     "joint_stiffness": _of_a_gear,
@@ -530,7 +489,7 @@ STARTS: Mapping[str, Callable[[StartContext], Hypothesis | None]] = {
     "motor_inertia": _neutral,
     "joint_damping": _neutral,
     "quadratic_drag": _neutral,
-    "load_dependent_friction": _law(smoothing_rad_s=_SMOOTHING),
+    "load_dependent_friction": dry_law(smoothing_rad_s=SMOOTHING),
     "gravity_compensation": _balancer,
     "cable_stiffness": _pulling_back,
     "transmission_error": _gear_waves,
@@ -565,10 +524,6 @@ STARTS: Mapping[str, Callable[[StartContext], Hypothesis | None]] = {
 }
 """Start of each effect, by its name."""
 
-# Smoothing of dry friction where positions are compared, as a share of the top speed. Positions do not show at which
-# speed friction changes sign, and a law that changes within one sample chatters.
-_TURNS_SLOWLY = 0.05
-
 
 def _gain_of_position(trial: StartContext) -> Hypothesis:
     """Start at the neutral values, with those controller gains free that no other effect imitates.
@@ -587,9 +542,9 @@ def _gain_of_position(trial: StartContext) -> Hypothesis:
 
 
 TARGET_STARTS: Mapping[str, Callable[[StartContext], Hypothesis | None]] = {
-    "coulomb_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
-    "asymmetric_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
-    "load_dependent_friction": _law(smoothing_rad_s=_TURNS_SLOWLY),
+    "coulomb_friction": dry_law(smoothing_rad_s=TURNS_SLOWLY),
+    "asymmetric_friction": dry_law(smoothing_rad_s=TURNS_SLOWLY),
+    "load_dependent_friction": dry_law(smoothing_rad_s=TURNS_SLOWLY),
     # Positions do not show pre-sliding.
     "presliding_friction": lambda _trial: None,
     # Without a logged torque, only a fit can show a wrong controller.

@@ -39,7 +39,8 @@ class Reach:
 
     - ``judged``: the stages, with the floor of a chattering machine if it is one.
     - ``reductions``: share of the explainable gap that each cause removes.
-    - ``left``: torque errors with all causes; ``change``: torque change from the simulator as given to all causes.
+    - ``left``: torque errors with all causes; ``given``: those as given.
+    - ``change``: torque change from the simulator as given to all causes.
     - ``simulator``: the simulator with all causes.
     """
 
@@ -48,6 +49,7 @@ class Reach:
     reductions: list[Interval]
     overlays: tuple[Overlay, ...]
     left: tuple[ErrorLog, ...]
+    given: tuple[ErrorLog, ...]
     change: Stage
     simulator: Variant
 
@@ -75,7 +77,8 @@ def reach_of(
     def measure(errors: Sequence[Array]) -> Stage:
         return stage(logs, errors, settings.block_s, measured)
 
-    given = measure(view.errors(before, logs))
+    as_given = view.errors(before, logs)
+    given = measure(as_given)
     refitted, *stages = [measure(view.errors(torques, logs)) for torques in steps]
     floor = measure(noise)
     after = stages[-1] if stages else refitted
@@ -100,6 +103,7 @@ def reach_of(
         reductions,
         overlays(view, logs, (before, steps[-1]), (given, after)),
         tuple(ErrorLog(*each) for each in remaining),
+        tuple(ErrorLog(*each) for each in zip(logs, as_given, noise, strict=True)),
         measure([b - a for a, b in zip(before, steps[-1], strict=True)]),
         simulators[-1],
     )

@@ -203,10 +203,10 @@ def between(values: Array, step: int) -> Array:
     )
 
 
-def _between_known(velocity: Array | None, step: int) -> Array | None:
-    """Return measured velocities at the controller's rate; None if an axis has none."""
-    known = velocity is not None and bool(np.isfinite(velocity).all())
-    return between(velocity, step) if velocity is not None and known else None
+def _between_known(signal: Array | None, step: int) -> Array | None:
+    """Return a measured signal at the controller's rate; None if an axis lacks it."""
+    known = signal is not None and bool(np.isfinite(signal).all())
+    return between(signal, step) if signal is not None and known else None
 
 
 def _check(robot: Robot, logs: Sequence[Log]) -> None:
@@ -278,7 +278,7 @@ def _commanded(robot: Robot, log: Log, step: int) -> Log:
         position_ref_rad=target,
         velocity_ref_rad_s=np.ascontiguousarray(rate),
         velocity_rad_s=_between_known(log.velocity_rad_s, step),
-        joint_position_rad=None,
+        joint_position_rad=_between_known(log.joint_position_rad, step),
         temperature_c=None,
     )
 
@@ -299,7 +299,7 @@ def _fed_dynamics(robot: Robot, position: Array, rate: Array) -> Array:
 def _thinned(log: Log, step: int) -> Log:
     """Return every ``step``-th sample of a log."""
     reference, target = log.velocity_ref_rad_s, log.position_ref_rad
-    velocity = log.velocity_rad_s
+    velocity, joint = log.velocity_rad_s, log.joint_position_rad
     return replace(
         log,
         sample_time_s=log.sample_time_s * step,
@@ -309,5 +309,6 @@ def _thinned(log: Log, step: int) -> Log:
         position_ref_rad=None if target is None else target[::step],
         velocity_ref_rad_s=None if reference is None else reference[::step],
         velocity_rad_s=None if velocity is None else velocity[::step],
+        joint_position_rad=None if joint is None else joint[::step],
         run_up=None,
     )

@@ -35,8 +35,8 @@ def dry_friction_nm(motions: Sequence[Motion], predict: Callable[[Motion], Array
     return out
 
 
-# Smallest share of the samples in each direction that separates friction from an offset.
-_EACH_WAY = 0.01
+EACH_WAY = 0.01
+"""Smallest share of the samples in each direction that separates friction from an offset."""
 # Smallest top speed of a log for an estimate of friction, as a share of the top speed in all logs.
 _MOVES = 0.1
 
@@ -52,7 +52,7 @@ def sure_friction_nm(motions: Sequence[Motion], predict: Callable[[Motion], Arra
     for row, (_, speed, *_) in zip(found, motions, strict=True):
         way = np.stack([direction(v) for v in speed.T], axis=1)
         least = np.minimum((way > 0.5).mean(axis=0), (way < -0.5).mean(axis=0))
-        row[(least < _EACH_WAY) | (np.abs(speed).max(axis=0) < _MOVES * top)] = np.inf
+        row[(least < EACH_WAY) | (np.abs(speed).max(axis=0) < _MOVES * top)] = np.inf
     out = found.min(axis=0)
     return np.asarray(np.where(np.isfinite(out), out, 0.0))
 

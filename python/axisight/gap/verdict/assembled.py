@@ -80,7 +80,11 @@ def assembled(
         conclusion, reach.judged, gap, settings, own_residual=found.adds_up
     )
     quiet = [a.axis for a in conclusion.axes if a.verdict == "none"]
-    left = remainder_of(reach.judged, gap_figures(reach.judged), reach.left, settings, quiet)
+    # A re-fit without a cause may bend the simulator until the rest follows nothing.
+    before = () if reach.reductions else reach.given
+    left = remainder_of(
+        reach.judged, gap_figures(reach.judged), reach.left, settings, quiet, before
+    )
     places = _places(conclusion, (bands, regimes, settings.significance), settings)
     conclusion = in_agreement(conclusion.ranked_on(places[0].axis) if places else conclusion)
     causes = _causes(conclusion, reductions)

@@ -11,6 +11,7 @@ from axisight.gap.facts.result import Gap, Remainder, Where
 from axisight.gap.facts.settings import Settings
 from axisight.gap.facts.wording import percent
 from axisight.gap.measure.gap_figures import Stages
+from axisight.gap.measure.other_axes import axis_followed
 from axisight.gap.measure.where import AT_REVERSALS, ErrorLog, band_map, placed, regime_maps
 from axisight.gap.verdict.carry_over import above_floor
 
@@ -24,12 +25,14 @@ def remainder_of(
     logs: Sequence[ErrorLog],
     settings: Settings,
     quiet: Collection[int] = (),
+    as_given: Sequence[ErrorLog] = (),
 ) -> Remainder:
     """Return what stands above the floor with the causes in.
 
     ``logs``: the validation logs with the error that remains and noise alone. ``quiet``: axes (from 1) whose
     verdict is *none*. These have no place, nor have axes that stand above the floor of no log, nor
-    simulations that broke off.
+    simulations that broke off. ``as_given``: the same logs with the error of the simulator as given, where it may
+    say more than that of the re-fitted one.
     """
     per_axis = np.sqrt(np.maximum(gap.after_per_axis**2 - gap.floor_per_axis**2, 0.0))
     total = float(np.sqrt(max(gap.after**2 - gap.floor**2, 0.0)))
@@ -49,10 +52,21 @@ def remainder_of(
         ),
         key=lambda w: -w.share,
     )
-    regime = where[0].regime
-    return Remainder(
-        total, per_axis, tuple(where), None if regime is None else regime.partition(":")[0]
-    )
+    followed = _followed(where[0], (logs, as_given), settings)
+    return Remainder(total, per_axis, tuple(where), followed)
+
+
+def _followed(first: Where, errors: Sequence[Sequence[ErrorLog]], settings: Settings) -> str | None:
+    """Return what the remainder at its first place varies with: a regime, the speed of another axis, both or none.
+
+    ``errors``: of one simulator or several; the first that follows another axis counts.
+    """
+    whole = [x for x in errors if x and all(len(y.error) == len(y.noise) for y in x)]
+    found = (axis_followed(logs, first.axis - 1, settings) for logs in whole)
+    other = next((axis for axis in found if axis is not None), None)
+    regime = "" if first.regime is None else first.regime.partition(":")[0]
+    speed = "" if other is None else f"the speed of axis {other + 1}"
+    return " and ".join(filter(None, [regime, speed])) or None
 
 
 def reversals_smeared(

@@ -1,17 +1,20 @@
 """Where a step from nothing promises little, candidates begin where they may be."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from axisight import Effect, Settings
+from axisight import Effect, Robot, Settings
 from axisight.effects import effect_info
+from axisight.effects.stated import LEAD
 from axisight.gap.hypotheses.ripple_orders import Turning
 from axisight.gap.hypotheses.start_context import StartContext, StartData
 from axisight.gap.hypotheses.start_values import STARTS, TARGET_STARTS
 from axisight.gap.screening.screening import Screening, ScreeningModel
 from axisight.gap.views.closed_loop import ClosedLoopView
+from axisight.robot_import import import_robot
 from gap_data import bare_axis, logs_of
 
 PLAN = {"multisine": ("multisine", 1)}
@@ -114,3 +117,24 @@ def test_no_law_of_dry_friction_may_turn_more_sharply_than_another(table):
         start = table[law](StartContext(effect_info(law), 1, robot, [log], at))
         least.add(start.bounds["smoothing_rad_s"][0])
     assert len(least) == 1
+
+
+SERVO = """<mujoco><worldbody><body><joint name="hinge" axis="0 1 0" armature="0.02"/>
+<inertial pos="0 0 -0.1" mass="0.3" diaginertia="5e-4 5e-4 1e-4"/></body></worldbody>
+<actuator><position joint="hinge" kp="40" kv="0.6"/></actuator></mujoco>"""
+
+
+def test_friction_ahead_of_the_speed_is_tried_where_the_simulator_moves_in_steps(tmp_path: Path):
+    (tmp_path / "arm.xml").write_text(SERVO)
+    turn = Turning(np.ones(8), np.zeros(8), np.full(8, 50.0), 1e-3)
+    at = StartData([[turn]], lambda *_: np.zeros(0), np.zeros(1))
+    log = logs_of(bare_axis(), [], PLAN)[0]
+
+    def leads(robot: Robot) -> list[float]:
+        trial = StartContext(effect_info("coulomb_friction"), 1, robot, [log], at)
+        start = TARGET_STARTS["coulomb_friction"](trial)
+        assert LEAD not in start.free
+        return [begin[LEAD] for begin in start.starts if LEAD in begin]
+
+    assert leads(bare_axis()) == []
+    assert leads(import_robot(tmp_path / "arm.xml")) == [0.0, 9.5e-3]

@@ -179,6 +179,19 @@ def test_a_remainder_says_what_it_varies_with(base):
     assert left.where[0].regime == "position: high"
 
 
+@pytest.mark.parametrize("shared", [0.0, 1.0], ids=["own", "shared"])
+def test_a_remainder_says_that_it_follows_another_axis(base, shared: float):
+    """Friction of the sum of two speeds, as in a wrist whose drives share a gear; or of its own speed alone."""
+    log, error, noise = base
+    first, second = np.gradient(log.position_rad, T, axis=0).T
+    error[:, 0] += 0.3 * np.tanh((first + shared * 3.0 * second) / 0.5)
+    given, floor = (stage([log], [x], 1.0) for x in (error, noise))
+    stages = Stages(given, given, given, floor)
+    left = remainder_of(stages, gap_figures(stages), [ErrorLog(log, error, noise)], Settings())
+    follows = left.varies_with is not None and "the speed of axis 2" in left.varies_with
+    assert follows == bool(shared)
+
+
 def test_a_remainder_in_a_few_stretches_has_its_axis_at_least(base):
     log, error, noise = base
     error[:, 0] += 0.5 * (log.time_s > 18.0)

@@ -1,0 +1,84 @@
+"""Says how far gears deflect that have an encoder on either side, beside the simulator's gears."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from axisight.gap.facts.faults import Finding
+from axisight.gap.signals.both_encoders import Swing, swings
+from axisight.gap.signals.noise import white_std
+from axisight.logs import Log
+from axisight.robot import Robot
+
+
+def gears_seen(robot: Robot, logs: Sequence[Log]) -> tuple[str, ...]:
+    """Return a sentence for each axis whose gear deflection logs show, in the order of the axes."""
+    found = _found(robot, logs)
+    text = "Both encoders show the gear of axis {3} give way by {0} to either side, the simulator's by {1}{2}."
+    return tuple(_said(text, robot, axis, swing) for axis, swing in found.items())
+
+
+def gears_that_differ(robot: Robot, logs: Sequence[Log]) -> tuple[Finding, ...]:
+    """Return a finding for each axis whose gear deflects otherwise than the simulator's.
+
+    That is by more than half of the larger of the two, and by more than the noise of a reading.
+    """
+    found = _found(robot, logs)
+    return tuple(
+        Finding(
+            "gear_gives_way",
+            "flag",
+            _said(
+                "expected the gear to give way by {1} to either side, got {0}{2}",
+                robot,
+                axis,
+                swing,
+            ),
+            axis=axis,
+            field=f"joint_position_{axis}",
+        )
+        for axis, swing in found.items()
+        if _differs(swing, _noise(robot, logs, axis))
+    )
+
+
+def _found(robot: Robot, logs: Sequence[Log]) -> dict[int, Swing]:
+    """Return the swing of the gears by axis (from 1): medians over the logs."""
+    each = [swings(log, robot) for log in logs]
+    out = {}
+    for axis in robot.axis_numbers():
+        seen = [swing for row in each if (swing := row[axis - 1]) is not None]
+        if seen:
+            measured, simulated, play = np.median(
+                [(s.measured_rad, s.simulated_rad, s.play_rad) for s in seen], axis=0
+            )
+            out[axis] = Swing(float(measured), float(simulated), float(play))
+    return out
+
+
+def _differs(swing: Swing, noise_rad: float) -> bool:
+    apart = abs(swing.measured_rad - swing.simulated_rad)
+    return apart > max(0.5 * max(abs(swing.measured_rad), swing.simulated_rad), noise_rad)
+
+
+def _noise(robot: Robot, logs: Sequence[Log], axis: int) -> float:
+    """Return the noise of a deflection as it is read [rad, joint side], the largest over the logs."""
+    ratio = np.abs(robot.gear_ratio[axis - 1])
+    return max(
+        float(ratio * white_std(log.position_rad, log.sample_time_s)[axis - 1])
+        + float(white_std(log.joint_position_rad, log.sample_time_s)[axis - 1])
+        for log in logs
+        if log.joint_position_rad is not None
+    )
+
+
+def _said(text: str, robot: Robot, axis: int, swing: Swing) -> str:
+    """Return a text with measured and simulated deflection, a clause about play, and the axis in its places 0 to 3."""
+    unit = "mm" if robot.axis_is_prismatic[axis - 1] else "mrad"
+    measured, simulated, play = (
+        f"{1e3 * x:.3g} {unit}" for x in (swing.measured_rad, swing.simulated_rad, swing.play_rad)
+    )
+    clause = f", as its torque turns round; {play} of it do not grow with the torque, as in play"
+    return text.format(measured, simulated, clause, axis)
