@@ -96,7 +96,6 @@ def test_mujocos_own_friction_is_refused():
     check_applicable([friction.with_values({"lead_s": 0.0})], 3)
 
 
-
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory: pytest.TempPathFactory) -> Robot:
     """A rigid arm: a gear of fifty in the shoulder, of ten in the elbow."""

@@ -12,8 +12,9 @@ from axisight.gap.search.state import alike
 
 # Most rivals of one cause that are tried.
 RIVALS = 3
-# Share of the cause's score that a rival needs if the cause was judged beside one that went out.
-_NEARLY = 0.8
+# Share of the leader's score that a rival needs if the leader was judged beside a cause that went out, or if the rival's
+# gain is more even over time.
+NEARLY = 0.8
 
 
 def exchanged(context: Context) -> Iterator[Proposal]:
@@ -45,7 +46,7 @@ def exchanged(context: Context) -> Iterator[Proposal]:
 def _nearly_as_good(cause: RankedHypothesis, entered: AxisPosterior) -> list[RankedHypothesis]:
     """Return the rivals of the same axis that explained nearly as much as a cause when it was added."""
     axis = cause.trial.hypothesis.effect.axis
-    near = (r for r in entered.ranked if r.score >= _NEARLY * cause.score)
+    near = (r for r in entered.ranked if r.score >= NEARLY * cause.score)
     return [r for r in near if r is not cause and r.trial.hypothesis.effect.axis == axis]
 
 

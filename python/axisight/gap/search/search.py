@@ -28,6 +28,7 @@ from axisight.gap.search.composites import named_simply
 from axisight.gap.search.contest import Context
 from axisight.gap.search.moves import AFTER_EACH_ROUND, AT_THE_END, finish, make
 from axisight.gap.search.pairs import Pairs
+from axisight.gap.search.rivals import NEARLY
 from axisight.gap.search.state import OPEN, Round, SearchState
 from axisight.gap.search.unsure_size import size_is_sure
 from axisight.statistics.tails import normal_deviate
@@ -274,10 +275,6 @@ def _pairs(
     return [member for i in kept for member in seen[i].members]
 
 
-# Share of the leader's score from which a candidate may be the cause in its place, if its gain is more even over time.
-_NEARLY = 0.8
-
-
 def _led_by_a_cause(
     standing: AxisPosterior, state: SearchState, settings: Settings, tried: int
 ) -> AxisPosterior | None:
@@ -286,7 +283,7 @@ def _led_by_a_cause(
     Candidates before it are not significant; they are taken out.
     """
     for k, r in enumerate(standing.ranked):
-        near = r.score >= _NEARLY * standing.best.score
+        near = r.score >= NEARLY * standing.best.score
         if near and _is_cause(r, standing, state, settings, tried):
             return standing.without_first(k)
     return None
