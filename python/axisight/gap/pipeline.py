@@ -15,7 +15,6 @@ from axisight.gap.fit.time_limit import TimeLimit
 from axisight.gap.intake.given import Given, check_options, given_inputs
 from axisight.gap.intake.prepared_logs import behind_gate
 from axisight.gap.measure.by_axis import believed_by_axis
-from axisight.gap.measure.gear_deflections import gears_seen, gears_that_differ
 from axisight.gap.measure.torque_traces import signals_of
 from axisight.gap.screening.search_round import Progress
 from axisight.gap.search.balanced_values import with_balanced_values
@@ -132,8 +131,6 @@ def _diagnosed(
     progress("looking at the logs", 0, 1)
     inputs = behind_gate(machine, fit_logs, held_logs, chosen.despite, given.simulated)
     progress("looking at the logs", 1, 1)
-    both = [*fit_logs, *held_logs]
-    gears, differ = gears_seen(machine, both), gears_that_differ(machine, both)
     inputs, view = inputs.compared(chosen)
     if asked is not None:
         asked.check_limits(view)
@@ -167,8 +164,8 @@ def _diagnosed(
     if signals:
         after = seen.reach.simulator
         out = replace(out, signals=signals_of(view, held_logs, after, logged=commanded is None))
-    checks = (*out.checks, *inputs.says(view.mode, view.compared), *gears)
-    found_faults = (*inputs.constants(out.refit), *differ, *out.findings)
+    checks = (*out.checks, *inputs.says(view.mode, view.compared))
+    found_faults = (*inputs.constants(out.refit), *out.findings)
     out = replace(out, simulator=inputs.simulator, checks=checks, findings=found_faults)
     logged = "recovered" if inputs.recovered else "logged"
     out.provenance["references"] = logged if view.mode == "closed_loop" else None

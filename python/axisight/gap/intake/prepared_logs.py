@@ -16,6 +16,7 @@ from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.gate import pass_gate, pass_gate_by_targets
 from axisight.gap.intake import user_simulator
 from axisight.gap.intake.start_of_logs import from_rest, loops_of
+from axisight.gap.measure.gear_deflections import gears_seen, gears_that_differ
 from axisight.gap.prepare.currents import Nominal, in_torques
 from axisight.gap.prepare.held_commands import HeldCommands, held_commands, where_they_act
 from axisight.gap.prepare.position_targets import Commanded, with_commands
@@ -143,7 +144,7 @@ class PreparedLogs:
             SAYS if self.recovered else "",
             "" if self.held is None else self.held.says(),
         ]
-        return tuple(filter(None, said))
+        return (*filter(None, said), *gears_seen(self.robot, [*self.estimation, *self.validation]))
 
 
 def behind_gate(
@@ -182,7 +183,7 @@ def behind_gate(
         noted = pass_gate(robot, logs[:n], logs[n:], despite)
     recovered = with_references(robot, logs)
     logs = logs if recovered is None else recovered
-    noted = (*found, *noted)
+    noted = (*found, *noted, *gears_that_differ(robot, logs))
     # Logs of the user's own simulator may hold their commands, too: the difference of both is compared.
     inverse = commanded is None and not beside and not is_closed_loop(robot, logs)
     held = held_commands(robot, logs) if inverse else None

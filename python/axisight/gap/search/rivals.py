@@ -12,8 +12,8 @@ from axisight.gap.search.state import alike
 
 # Most rivals of one cause that are tried.
 RIVALS = 3
-# Share of the leader's score that a rival needs if the leader was judged beside a cause that went out, or if the rival's
-# gain is more even over time.
+# Share of the leader's score that a rival needs if the leader was judged beside a cause that went out, or if the
+# rival's gain is more even over time.
 NEARLY = 0.8
 
 
