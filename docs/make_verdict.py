@@ -39,8 +39,8 @@ for cause in verdict["causes"]:
 `axisight schema` prints the JSON Schema; in Python it is `axisight.gap.verdict_schema()`.
 
 - Ignore keys that you do not know: versions add keys and never change them.
-- Version 2 adds the verdict `explained_in_part`. Version 1 called it `explained`, or `unknown` with causes. A reader
-  of version 1 can treat it as `explained` and look at `remainder`. Nothing else has changed, and commands that read
+- Version 2 adds the verdict `explained_in_part`. Version 1 called it `explained`. A reader of version 1 can treat
+  it as `explained` and look at `remainder`. Nothing else has changed, and commands that read
   verdicts read both.
 - Ratios are plain numbers, not per cent.
 - Numbers that do not exist, such as the gap of a simulation that broke off, are `null`.

@@ -12,7 +12,7 @@ from axisight.cli.common import say
 from axisight.cli.screen import OUT
 from axisight.cli.summary import next_steps, summary
 from axisight.gap import Diagnosis, Gap, Interval, Where
-from axisight.gap.facts.axis_names import own_name
+from axisight.gap.facts.axis_names import in_words, own_name
 from axisight.gap.facts.compared_quantity import (
     FROM_POSITIONS,
     MOTION_HEAD,
@@ -54,15 +54,15 @@ def show_diagnosis(
         say(f"next: {' '.join(next_steps(found, given, command))}")
         return
     first, *rest = summary(found, OUT.width, given, command)
-    OUT.print(f"[bold]{escape(found.verdict)}[/]", end="")
-    say(first.removeprefix(found.verdict))
+    OUT.print(f"[bold]{escape(in_words(found.verdict))}[/]", end="")
+    say(first.removeprefix(in_words(found.verdict)))
     for line in rest:
         say(line)
 
 
 def _show_all(found: Diagnosis) -> None:
     """Print verdict, causes, the gap by axis and pooled, what remains, the re-fit and the ranking."""
-    OUT.print(f"[bold]{escape(found.verdict)}[/]: ", end="")
+    OUT.print(f"[bold]{escape(in_words(found.verdict))}[/]: ", end="")
     say(found.headline)
     if found.causes:
         OUT.print(_causes(found))
@@ -144,7 +144,7 @@ def _gaps(found: Diagnosis) -> Table:
     gap = found.gap
     for i, verdict, row in found.axis_rows():
         table.add_row(str(i), verdict, *(_percent(x) for x in row))
-    table.add_row("all", found.verdict, *_stages(gap))
+    table.add_row("all", in_words(found.verdict), *_stages(gap))
     # rich wraps the caption to the width of the table, so each sentence gets its own line.
     table.caption = f"axis: rms error / standard deviation of the {torque_of(gap.compared)}; all: rms of the axes"
     if gap.pooled is not None:

@@ -93,7 +93,7 @@ def next_steps(found: Diagnosis, given: Collection[str] = (), command: str = "")
         limits = ["--verbose lists the smallest effects that these logs would show."]
         return [*out, "Nothing to correct.", *(limits if found.detection_limits else [])]
     told = [text for option, text in offers.items() if option not in given]
-    if found.verdict in ("unknown", "undecidable"):
+    if found.verdict in ("unknown", "undecidable", "explained_in_part"):
         told.append("--explain says what was tried.")
     out += [f"{command} {text}".strip() for text in told]
     if found.verdict == "explained" and "--write-model" in given:
@@ -177,9 +177,9 @@ def _basis(found: Diagnosis) -> list[str]:
 
 
 def _places(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
-    """Return where the rest of the gap lies, only for the verdict unknown."""
+    """Return where the rest of the gap lies, if something stays unknown."""
     left = found.remainder
-    if found.verdict != "unknown" or left is None:
+    if found.verdict not in ("unknown", "explained_in_part") or left is None:
         return []
     out = [
         _cut(f"remains on axis {place.axis}: {place.evidence}", width)

@@ -6,7 +6,7 @@ the cause.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
 from axisight.effects import Effect, effect_info
@@ -98,7 +98,7 @@ def _in_parts(
     if not parts:
         return ()
     present = {e.label for e in model.effects}
-    free = parts_of(effect, winner.trial.hypothesis.bounds, present)
+    free = parts_of(effect, winner.trial.hypothesis, present)
     alone = all_fitted(fitted_with(fitter, [*model.free, f], model) for f in free)
     both = alone
     if alone is not None and len(free) == 2:
@@ -132,11 +132,12 @@ def _needed(
     return [alone[1]] if sure[1] else [alone[0]]
 
 
-def parts_of(
-    composite: Effect, bounds: Mapping[str, tuple[float, float]], known: Collection[str]
-) -> list[Hypothesis]:
-    """Return the parts of a composite that are not ``known`` by label, with the composite's shape parameters."""
-    free = [_part(name, composite, bounds) for name in effect_info(composite.name).parts]
+def parts_of(composite: Effect, tried: Hypothesis, known: Collection[str]) -> list[Hypothesis]:
+    """Return the parts of a composite that are not ``known`` by label, with the composite's shape parameters.
+
+    Shape parameters are free where those of the composite are, as it was ``tried``.
+    """
+    free = [_part(name, composite, tried) for name in effect_info(composite.name).parts]
     return [f for f in free if f.effect.label not in known]
 
 
@@ -158,10 +159,11 @@ def all_fitted(trials: Iterable[FittedHypothesis | None]) -> list[FittedHypothes
     return found
 
 
-def _part(name: str, composite: Effect, bounds: Mapping[str, tuple[float, float]]) -> Hypothesis:
+def _part(name: str, composite: Effect, tried: Hypothesis) -> Hypothesis:
     """Return a part of a composite, with the composite's shape parameters."""
     given = composite.parameters or {}
     info = effect_info(name).parameters
     values = {p.name: given.get(p.name, p.neutral) for p in info}
-    shared = {p.name: bounds[p.name] for p in info if p.name in bounds}
-    return Hypothesis(Effect(name, composite.axis, values), tuple(values), bounds=shared)
+    shared = {p.name: tried.bounds[p.name] for p in info if p.name in tried.bounds}
+    free = tuple(p.name for p in info if p.role == "amplitude" or p.name in tried.free)
+    return Hypothesis(Effect(name, composite.axis, values), free, bounds=shared)

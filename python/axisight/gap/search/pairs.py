@@ -122,8 +122,7 @@ class Pairs:
 
     def _parts(self, composite: FittedHypothesis, known: set[str]) -> list[FittedHypothesis]:
         """Return the parts of a composite, each fitted on top of the model; without those already ``known``."""
-        effect, bounds = composite.fitted.effects[-1], composite.hypothesis.bounds
-        free = parts_of(effect, bounds, known)
+        free = parts_of(composite.fitted.effects[-1], composite.hypothesis, known)
         return (
             all_fitted(fitted_with(self.fitter, [*self.model.free, f], self.model) for f in free)
             or []

@@ -19,6 +19,7 @@ from axisight.gap.fit.settling import settled
 from axisight.gap.fit.time_limit import TimeLimit, TimeUp
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, falls
 from axisight.gap.ranking.likelihood import FORMULA_ERROR
+from axisight.gap.ranking.ordinary_first import is_lacked, ordinary_first
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.screening.column_cache import ColumnCache
 from axisight.gap.screening.promise import HOPELESS
@@ -178,7 +179,7 @@ def _taken(
         mine = fall[place[s.best.trial.label]]
         return -float(mine.sum()), -float(mine[s.axis])
 
-    causes = {s.axis: _led_by_a_cause(s, state, settings, tried) for s in standings}
+    causes = {s.axis: _led_by_a_cause(s, round_.fitter, state, settings, tried) for s in standings}
     for standing in sorted(standings, key=felt_most):
         led = causes[standing.axis]
         if led is None or _beaten_at_home(led, causes):
@@ -276,15 +277,18 @@ def _pairs(
 
 
 def _led_by_a_cause(
-    standing: AxisPosterior, state: SearchState, settings: Settings, tried: int
+    standing: AxisPosterior, fitter: ModelFitter, state: SearchState, settings: Settings, tried: int
 ) -> AxisPosterior | None:
     """Return the posterior led by its first candidate that is a cause and close to the leader; None if there is none.
 
-    Candidates before it are not significant; they are taken out.
+    Candidates before it are not significant, or give way to what every machine has; they are taken out.
     """
+    standing = ordinary_first(
+        standing, fitter, lambda r: _is_cause(r, standing, fitter, state, settings, tried)
+    )
     for k, r in enumerate(standing.ranked):
         near = r.score >= NEARLY * standing.best.score
-        if near and _is_cause(r, standing, state, settings, tried):
+        if near and _is_cause(r, standing, fitter, state, settings, tried):
             return standing.without_first(k)
     return None
 
@@ -292,6 +296,7 @@ def _led_by_a_cause(
 def _is_cause(
     best: RankedHypothesis,
     standing: AxisPosterior,
+    fitter: ModelFitter,
     state: SearchState,
     settings: Settings,
     tried: int,
@@ -299,14 +304,17 @@ def _is_cause(
     """Whether a candidate explains enough of an axis, and significantly.
 
     The level keeps the false alarms of all ``tried`` candidates together at ``settings.false_alarms`` (Bonferroni).
-    Each has two tests: its gain and its size.
+    Each has two tests: its gain and its size. What every machine has and the simulator lacks is expected: the level is
+    that of one candidate, and it may be small beside the other causes.
     """
-    needed = max(
-        settings.significance,
-        normal_deviate(settings.false_alarms / max(2 * tried, 1)),
-    )
-    fall = best.gain * float(state.layout.samples()[standing.axis])
+    expected = is_lacked(best, standing.axis, fitter)
+    all_tried = normal_deviate(settings.false_alarms / max(2 * tried, 1))
+    alone = normal_deviate(settings.false_alarms / 2)
+    needed = alone if expected else max(settings.significance, all_tried)
+    samples = float(state.layout.samples()[standing.axis])
+    fall = best.gain * samples
     least = float(state.least_falls(settings)[standing.axis])
+    least = settings.smallest_gain * samples if expected else least
     large = fall > least and not state.mends(best.trial)
     worth = large and best.score > settings.smallest_score
     if worth and not size_is_sure(best.trial.fitted, len(best.trial.fitted.free) - 1):

@@ -11,10 +11,10 @@ it. The validation logs say what the table shows. One rule makes the label of an
 | *undecidable* | as above, and *undecidable* where a cause acts that stays open |
 | *unknown* | *explained* where a cause removes the gap, *unknown* where a gap is left, else *none* |
 
-So no axis of an *explained* arm is *unknown*. An axis that would be *explained* is *explained in part* where the gap
-with the causes is at least twice the floor, with the error of formulas added in squares. The arm is *explained in
-part* where an axis of an *explained* arm is, and where an *unknown* arm keeps causes. At least one axis has the verdict
-of the arm, or of its part. An axis that is *none* has no cause, and no place where the gap lies.
+By inverse dynamics, an axis of such an arm is *unknown* where no cause acts and a gap is left. An axis that would be
+*explained* is *explained in part* where the gap with the causes is at least twice the floor, with the error of formulas
+added in squares. The arm is *explained in part* where an axis of an *explained* arm is, or is *unknown*. At least one
+axis has the verdict of the arm, or of its part. An axis that is *none* has no cause, and no place where the gap lies.
 
 An axis has a gap where one of these holds:
 
@@ -101,14 +101,11 @@ def axis_verdicts(
         for i, gap in enumerate(gaps, start=1)
     ]
     labels = [
-        _label(arm, e, gap, mine, causes, settings)
+        _label(arm, e, gap, mine, causes, settings, own_residual=own_residual)
         for e, gap, mine in zip(evidence, gaps, acting, strict=True)
     ]
-    if (
-        arm != "none"
-        and arm not in labels
-        and not (arm == "explained" and "explained_in_part" in labels)
-    ):
+    known = {arm, "explained_in_part"} if arm == "explained" else {arm}
+    if arm != "none" and known.isdisjoint(labels):
         # A cause of the whole arm that leaves no axis above the floor acts on all of them alike.
         whole = tuple(k for k, c in enumerate(causes) if not c.axes)
         for i in _stand_for_the_arm(arm, evidence, labels, acting, whole):
@@ -127,9 +124,13 @@ def _label(
     acting: Sequence[int],
     causes: Sequence[Acting],
     settings: Settings,
+    *,
+    own_residual: bool,
 ) -> VerdictKind:
     if arm == "none" or not (gap or acting):
         return "none"
+    if own_residual and not acting and evidence.left:
+        return "unknown"
     if arm == "undecidable" and any(causes[k].open for k in acting):
         return "undecidable"
     if arm == "unknown" and gap and not _removed(evidence, acting, causes, settings):
@@ -201,10 +202,8 @@ def with_axes_agreed(
 
 def verdict_told(conclusion: Conclusion) -> VerdictKind:
     """Return the verdict of the arm as it is told: *explained in part* where its causes leave a gap unexplained."""
-    parts = any(a.verdict == "explained_in_part" for a in conclusion.axes)
+    parts = {a.verdict for a in conclusion.axes} & {"explained_in_part", "unknown"}
     if conclusion.verdict == "explained" and parts:
-        return "explained_in_part"
-    if conclusion.verdict == "unknown" and conclusion.causes:
         return "explained_in_part"
     return conclusion.verdict
 

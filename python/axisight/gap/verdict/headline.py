@@ -176,7 +176,9 @@ def _refitted(facts: Facts) -> str:
 
 def _explained(facts: Facts) -> list[str]:
     """Of causes: those that are sure, those that stay open, what they do to the gap, what is left."""
-    return [_sure(facts), _open(facts), _effect(facts), _chance(facts), _twins(facts), _rest(facts)]
+    out = [_sure(facts), _open(facts), _effect(facts), _chance(facts), _twins(facts), _rest(facts)]
+    unknown = any(a.verdict == "unknown" for a in facts.axes)
+    return [*out, _gap_left(facts)] if unknown else out
 
 
 def _chance(facts: Facts) -> str:
