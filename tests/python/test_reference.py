@@ -44,7 +44,7 @@ TRAJECTORIES: dict[str, Effects] = {
     "nominal": [],
     "ripple": _ripple(),
     "friction_axis2_cubic_axis1": [
-        ("coulomb_friction", 2, [0.5, 0.5, 0.0]),
+        ("coulomb_friction", 2, [0.5, 0.5, 0.0, 0.0]),
         ("nonlinear_stiffness", 1, [2e11]),
     ],
 }

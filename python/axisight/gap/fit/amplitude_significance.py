@@ -21,6 +21,9 @@ from axisight.statistics.tails import log_fisher_tail
 
 Array = NDArray[np.float64]
 
+# Marks of shapes that need not be fitted: they belong to a way of writing the law, or may be idle.
+_UNUSED = {"notation", "optional"}
+
 
 def amplitude_significance(fitted: FittedModel, stretch: NDArray[np.int64]) -> float:
     """Return how surely the last effect's amplitudes differ from the simulator's [standard deviations of a normal].
@@ -58,13 +61,14 @@ def _amplitudes(fitted: FittedModel) -> list[int]:
     """Return the columns of the last effect's amplitudes, without those on a bound.
 
     Empty if the shape of the effect was chosen from many, such as a ripple order: the best of many shapes has a size in
-    any noise.
+    any noise. A shape that no fit needs was not chosen.
     """
     last = len(fitted.effects) - 1
     if last < 0:
         return []
-    info = effect_info(fitted.effects[last].name)
-    if any(p.role == "shape" and p.name not in fitted.free[last].free for p in info.parameters):
+    info, free = effect_info(fitted.effects[last].name), fitted.free[last].free
+    shapes = [p for p in info.parameters if p.role == "shape" and not _UNUSED & {*p.marks}]
+    if any(p.name not in free for p in shapes):
         return []
     sizes = {p.name for p in info.parameters if p.role == "amplitude" and p.neutral == 0}
     return [

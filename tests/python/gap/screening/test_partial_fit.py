@@ -12,7 +12,7 @@ from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.fit.settling import settled
 from axisight.gap.screening.partial_fit import Begun, TrialFit
 from axisight.gap.screening.screening import Screening, ScreeningModel, Start, thinned
-from axisight.gap.search.search import _refitted
+from axisight.gap.search.search import refitted
 from axisight.gap.views.closed_loop import ClosedLoopView
 from gap_data import bare_axis, logs_of, scattered
 
@@ -106,7 +106,7 @@ def first_nine_tenths(fitted: FittedModel) -> np.ndarray:
 
 
 def test_a_model_and_a_simulator_settle_where_they_would_without(view, whole, friction, screen):
-    again = _refitted(view.fitter)
+    again = refitted(view.fitter, lambda *_: None)
     assert again.total == pytest.approx(whole.total, rel=1e-3)
     direct = settled(view.fitter, [friction], whole)
     begun = settled(view.fitter, [friction], whole, rough=screen.bench.fitter)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
+from axisight.effects.stated import LOAD
 from axisight.gap.gate.by_dynamics.torque_fit import nuisance
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from axisight.gap.signals.motion import Motion
@@ -41,7 +42,7 @@ def load_torques(robot: Robot, at: Motion, bodies: Array) -> list[Array]:
 
 def _loaded(robot: Robot, place: tuple[float, float, float]) -> Robot:
     x, y, z = place
-    load = Effect("payload", None, {"mass_kg": 1.0, "x_m": x, "y_m": y, "z_m": z})
+    load = Effect(LOAD, None, {"mass_kg": 1.0, "x_m": x, "y_m": y, "z_m": z})
     return robot.with_effects([*robot.effects, load])
 
 
