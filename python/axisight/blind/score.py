@@ -158,13 +158,25 @@ def _label(entry: dict[str, Any]) -> str:
 
 
 def sizes(true: dict[str, float]) -> dict[str, float]:
-    """Return the comparable values of a truth: parameters, and wave amplitudes by order."""
-    out = {k: v for k, v in true.items() if not k.startswith(("order", "amplitude"))}
-    for key, order in true.items():
-        if key.startswith("order"):
-            size = next(v for k, v in true.items() if k.startswith("amplitude" + key[5:] + "_"))
-            out[f"amplitude of order {order:g}"] = size
-    return out
+    """Return the comparable values of a truth: parameters, and wave amplitudes by order.
+
+    A truth states a wave by its amplitude, or by cosine and sine as an effect does. A wave without a size is left out.
+    """
+    orders = {key[5:]: order for key, order in true.items() if key.startswith("order")}
+    waves = {
+        number: [
+            v
+            for k, v in true.items()
+            if k.startswith((f"amplitude{number}_", f"cosine{number}_", f"sine{number}_"))
+        ]
+        for number in orders
+    }
+    parts = ("order", "amplitude", *(f"{p}{n}_" for n in orders for p in ("cosine", "sine")))
+    out = {k: v for k, v in true.items() if not k.startswith(parts)}
+    sized = {
+        f"amplitude of order {orders[n]:g}": float(np.linalg.norm(v)) for n, v in waves.items() if v
+    }
+    return {**out, **sized}
 
 
 def comparable(found: dict[str, Any]) -> dict[str, tuple[float, float, float]]:
@@ -235,7 +247,7 @@ def _over(true: dict[str, float], limit: dict[str, Any]) -> float:
     A size under another formula's name comes first.
     """
     waves = [v for k, v in true.items() if k.startswith("amplitude")]
-    size = true.get(limit["parameter"], max(waves, default=next(iter(true.values()))))
+    size = true.get(limit["parameter"], max(waves, default=next(iter(true.values()), 0.0)))
     return 0.0 if limit["value"] is None else abs(size) / float(limit["value"])
 
 

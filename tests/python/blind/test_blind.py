@@ -438,6 +438,9 @@ def test_waves_are_compared_by_their_order():
         "sine_1_nm": {"value": -0.08, "ci95": [-0.09, -0.07]},
     }
     assert sizes(true) == {"amplitude of order 2": 0.5, "amplitude of order 6": 0.1}
+    # As an effect states it, and without a size.
+    waves = {"order_1": 6.0, "cosine_1_nm": 0.06, "sine_1_nm": -0.08, "order_2": 9.0}
+    assert sizes(waves) == {"amplitude of order 6": pytest.approx(0.1)}
     value, low, high = comparable(found)["amplitude of order 6"]
     assert (value, low, high) == pytest.approx((0.1, 0.09, 0.11))
 
