@@ -156,11 +156,10 @@ class Where:
 class Remainder:
     """The gap above the floor that is left on the validation logs with the causes in.
 
-    ``gap``: sqrt(after^2 - floor^2) [1], zero where only noise is left; ``per_axis``: the same by
-    axis, (n_axes,). ``where``: the places above the floor, with shares of the squared
-    remainder; empty where no axis is above it. ``varies_with``: the variable that it follows at the
-    first place (``speed``, ``direction``, ``position``, ``acceleration``, ``load`` or ``time``, or ``the speed of
-    axis`` and its number), if any.
+    ``gap``: sqrt(after^2 - floor^2) [1], zero where only noise is left; ``per_axis``: the same by axis, (n_axes,).
+    ``where``: places above the floor, with shares of the squared remainder. ``varies_with``: the variable that it
+    follows at the first place (``speed``, ``direction``, ``position``, ``acceleration``, ``load``, ``time``, or ``the
+    speed of axis`` and its number), if any.
     """
 
     gap: float
@@ -350,10 +349,9 @@ class Diagnosis:
     ``detection_limits``: of each effect that is no cause.
     ``refit``: relative change of the simulator's own parameters [1]. ``settings``: what was set, by
     the names of `Settings`.
-    ``findings``: faults of robot file and logs that do not rule out a diagnosis, and
-    parameters that the re-fit took to the edge of their tolerance. ``experiment``, if asked for: an experiment
-    that separates open causes, or shows an effect. ``simulator``: how far the
-    model reproduces the user's own simulator, where its logs were given.
+    ``findings``: faults of robot file and logs that do not rule out a diagnosis, and parameters that the re-fit took to
+    the edge of their tolerance. ``experiment``, if asked for: one that separates open causes, or shows an effect.
+    ``simulator``: how far the model reproduces the user's own simulator, where its logs were given.
     ``signals``, if asked for: a Dataset for each log, estimation logs first, with the dims (time_s, axis)
     [Nm, N on a prismatic axis; motor side]. ``measured_torque_nm``. ``simulated_before_torque_nm`` of the
     simulator as given, ``simulated_after_torque_nm`` of the re-fitted one with the causes: those behind
