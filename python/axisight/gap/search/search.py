@@ -31,7 +31,6 @@ from axisight.gap.search.moves import AFTER_EACH_ROUND, AT_THE_END, finish, make
 from axisight.gap.search.pairs import Pairs
 from axisight.gap.search.rivals import NEARLY
 from axisight.gap.search.state import OPEN, Round, SearchState
-from axisight.gap.search.unsure_size import size_is_sure
 from axisight.statistics.tails import normal_deviate
 
 Array = NDArray[np.float64]
@@ -317,8 +316,6 @@ def _is_cause(
     least = settings.smallest_gain * samples if expected else least
     large = fall > least and not state.mends(best.trial)
     worth = large and best.score > settings.smallest_score
-    if worth and not size_is_sure(best.trial.fitted, len(best.trial.fitted.free) - 1):
-        return False
     return best.significance > needed and worth and standing.best.probability > standing.p_none
 
 

@@ -1,4 +1,7 @@
-"""Proposes to replace or remove causes whose size is not sure: the interval of every amplitude includes nothing."""
+"""Proposes to replace or remove causes whose size is not sure: the interval of every amplitude includes nothing.
+
+Sizes are judged when all causes are in the model. Before, the errors of missing causes widen every interval.
+"""
 
 from __future__ import annotations
 
