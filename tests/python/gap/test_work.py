@@ -102,7 +102,7 @@ def test_a_search_on_six_axes_does_no_more_than_it_did():
         "refining": Work(fits=2, evaluations=2),
         "judging": Work(linearizations=11),
         "adding": Work(fits=2, steps=14, evaluations=32),
-        "moves": Work(fits=30, steps=38, evaluations=85, linearizations=17),
+        "moves": Work(fits=36, steps=49, evaluations=103, linearizations=18),
         "measuring": Work(fits=2, steps=3, evaluations=8),
     }
     check(of_arm(threads=2), most)
