@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from axisight.gap import Diagnosis, Finding
 from axisight.gap.facts.axis_names import axis_label, in_words
 from axisight.gap.facts.compared_quantity import FROM_POSITIONS, torque_of
+from axisight.gap.facts.faults import by_kind
 from axisight.gap.facts.result import Cause
 from axisight.gap.facts.wording import LARGEST, percent
 from axisight.gap.intake.user_simulator import said
@@ -198,14 +199,20 @@ def _findings(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
         left.append("further parameters")
     if not findings or not detail.findings:
         return [f"not shown: {' and '.join(left)} (--verbose)"] if left else []
-    whole = [f"finding: {finding}" for finding in findings[: detail.findings]]
+    kinds = by_kind(findings)
+    whole = [_of_kind(same) for same in kinds[: detail.findings]]
     out = [_cut(line, width) for line in whole]
-    more = len(findings) - len(out)
+    more = sum(map(len, kinds[detail.findings :]))
     if more:
         out.append(f"and {more} more: --verbose shows all findings in full")
     elif out != whole:
         out.append("--verbose shows findings in full")
     return out
+
+
+def _of_kind(same: Sequence[Finding]) -> str:
+    """Return the first finding of a kind, with the number of all where there are more."""
+    return f"finding: {same[0]}" if len(same) == 1 else f"{len(same)} findings, first: {same[0]}"
 
 
 def _is_minor(finding: Finding) -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 from axisight.effects import effect_table
 from axisight.gap.facts.axis_names import axis_label, in_words
 from axisight.gap.facts.compared_quantity import MOTION_HEAD, motion_words, torque_of
+from axisight.gap.facts.faults import by_kind
 from axisight.gap.facts.result import (
     Candidate,
     Cause,
@@ -125,7 +126,7 @@ def _page(diagnosis: Diagnosis) -> dict[str, Any]:
         "pooled": diagnosis.gap.pooled is not None,
         "motion": _motion(diagnosis.gap),
         "values": _values(diagnosis.causes),
-        "findings": [str(finding) for finding in diagnosis.findings],
+        "findings": [[str(x) for x in same] for same in by_kind(diagnosis.findings)],
         "where": _places(diagnosis.where),
         "remainder": None
         if remainder is None

@@ -167,7 +167,20 @@ def test_findings_that_matter_come_first_and_the_rest_is_counted():
     told = [line for line in lines if line.startswith("finding: ")]
     assert told[0].startswith("finding: simulator_differs: axis 1: expected a model")
     assert told[0].endswith(" ...")
-    assert "and 1 more: --verbose shows all findings in full" in lines
+    # Those of one kind are one line.
+    (same,) = [line for line in lines if line.startswith("3 findings, first: ")]
+    assert same.startswith(f"3 findings, first: {minor.name}: ")
+
+
+def test_kinds_of_findings_beyond_the_first_are_counted():
+    found = [
+        Finding(name, "flag", "expected another model", field=f"axis {k}")
+        for name in ("refit_worse", "torque_scaled", "rows_repeated", "rows_missing")
+        for k in (1, 2)
+    ]
+    lines = summary(replace(explained(), findings=tuple(found)), WIDTH)
+    assert "2 findings, first: refit_worse: axis 1: expected another model" in lines
+    assert "and 2 more: --verbose shows all findings in full" in lines
 
 
 def test_hostile_texts_stay_on_their_lines():

@@ -194,3 +194,11 @@ def check_names(names: Collection[str]) -> None:
 def refused(findings: Iterable[Finding]) -> bool:
     """Whether any of the findings rules out a diagnosis."""
     return any(finding.severity == "refuse" for finding in findings)
+
+
+def by_kind(findings: Iterable[Finding]) -> list[list[Finding]]:
+    """Return findings of one name together, in the order of their first ones."""
+    out: dict[str, list[Finding]] = {}
+    for finding in findings:
+        out.setdefault(finding.name, []).append(finding)
+    return list(out.values())
