@@ -108,9 +108,6 @@ VISCOUS_FRICTION = "viscous_friction"
 ROTOR = "rotor_inertia"
 """Motor inertia that a model file leaves out."""
 
-EVERY_MACHINE = (VISCOUS_FRICTION, DRY_FRICTION[0], ROTOR)
-"""What every axis of a machine has, and a model file may leave out."""
-
 MOTOR_INERTIA = "motor_inertia"
 """Change of the simulator's motor inertia."""
 

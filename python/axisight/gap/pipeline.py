@@ -143,10 +143,19 @@ def _diagnosed(
         view.fitter, view.candidates, view.floor.expected, chosen, progress, limit, baseline
     )
     taken, scatter = with_scatter_taken(inputs.robot, found, chosen)
-    if scatter:
-        inputs = inputs.with_effects_of(taken, scatter)
-        view = inputs.view(chosen)
-        found = search(view.fitter, view.candidates, view.floor.expected, chosen, progress, limit)
+    if scatter and found.stopped is None:
+        restated = inputs.with_effects_of(taken, scatter)
+        seen_by = restated.view(chosen)
+        again = search(
+            seen_by.fitter, seen_by.candidates, seen_by.floor.expected, chosen, progress, limit
+        )
+        if again.stopped is None:
+            inputs, view, found = restated, seen_by, again
+        else:
+            # What the first search found stays; it is not told as complete.
+            found.stopped = replace(
+                again.stopped, causes=tuple(f.effect.label for f in found.model.free)
+            )
     machine, held_logs, commanded = inputs.robot, inputs.validation, inputs.commanded
     found = with_constants_told(found, view.fitter, view.shown)
     found = with_balanced_values(believed_by_axis(found, view.fitter, chosen), view.fitter)

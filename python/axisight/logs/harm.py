@@ -17,6 +17,8 @@ _BAND_SHARE = 0.2
 # Largest share of the power of the acceleration that does no harm: 3 % of its amplitude. Models of real machines
 # leave more of the torque.
 _HARMLESS = 1e-3
+# Samples that a low-pass needs more of.
+_FEWEST = 20
 # Steps around a place whose median is the usual step, and which count to its fault.
 _NEIGHBOURS = 7
 
@@ -28,8 +30,10 @@ def is_harmless(values: Floats, wrong: Floats, sample_time_s: float) -> bool:
     """Return whether wrong steps change the acceleration of a position too little to matter.
 
     ``values`` (n,): the position; ``wrong`` (n - 1,): the part of its steps that faults made. Both accelerations are
-    compared in the band of motions of arms.
+    compared in the band of motions of arms. False for a position that is too short for a low-pass.
     """
+    if len(values) <= _FEWEST:
+        return False
     band = min(_BAND_HZ, _BAND_SHARE / sample_time_s)
     steps = np.column_stack([np.diff(values) - wrong, wrong])
     motion, fault = np.diff(lowpass(steps, sample_time_s, band), axis=0).T

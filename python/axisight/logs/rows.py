@@ -18,6 +18,8 @@ from axisight.logs.recorded import RecordedRows
 _SHORTEST = 0.1
 # Largest travel of an axis that stands, as a share of that of the axis that travels most.
 _STANDS = 0.01
+# Share of steps with the sign of the step before: all but the reversals of a motion, a third of noise.
+_GOES_ON = 0.5
 # How far uneven stamps may be off, in steps: a reading that is a step old, with half a step of jitter.
 _STAMPS_LATE = 1.5
 
@@ -51,11 +53,20 @@ def _findings(
 def _of_axes_that_move(signals: Mapping[Channel, Floats]) -> dict[Channel, Floats]:
     """Return the signals without those of axes that stand beside others that move.
 
-    What shakes an axis that stands, or its encoder, makes jumps and rests that say nothing of the rows.
+    What shakes an axis that stands, or its encoder, makes jumps and rests that say nothing of the rows. Its travel is
+    small beside that of others, and it goes on nowhere: a slide in metres travels less than a joint in radians.
     """
-    travel = {axis: float(np.ptp(x)) for (field, axis), x in signals.items() if field == "position"}
+    positions = {axis: x for (field, axis), x in signals.items() if field == "position"}
+    travel = {axis: float(np.ptp(x)) for axis, x in positions.items()}
     least = _STANDS * max(travel.values(), default=0.0)
-    return {c: x for c, x in signals.items() if travel.get(c[1], np.inf) > least}
+    stands = {axis for axis, x in positions.items() if travel[axis] <= least and not _goes_on(x)}
+    return {c: x for c, x in signals.items() if c[1] not in stands}
+
+
+def _goes_on(values: Floats) -> bool:
+    """Whether most steps of a signal (n,) have the sign of the step before, as in a motion and not in noise."""
+    step = np.diff(values)
+    return bool(np.mean(step[1:] * step[:-1] > 0) >= _GOES_ON) if len(step) > 1 else False
 
 
 def check_recorded(rows: RecordedRows) -> list[Finding]:

@@ -105,13 +105,18 @@ def _members(name: str, value: dict[str, Any]) -> dict[str, Reader]:
     """Return the columns of the members of an object."""
     found: dict[str, Reader] = {}
     for key, inner in value.items():
-        for column, reader in _columns(f"{name}.{key}" if name else key, inner).items():
-            twice = column in found
-            found[column] = (
-                refusing("expected one column of that name, got several") if twice else reader
-            )
-        _check_width(len(found))
+        _add(found, _columns(f"{name}.{key}" if name else key, inner))
     return found
+
+
+def _add(found: dict[str, Reader], more: dict[str, Reader]) -> None:
+    """Add columns; of a name that is there already, none can be read."""
+    for column, reader in more.items():
+        twice = column in found
+        found[column] = (
+            refusing("expected one column of that name, got several") if twice else reader
+        )
+    _check_width(len(found))
 
 
 def _records(name: str, records: Sequence[dict[str, Any]]) -> dict[str, Reader]:
@@ -126,11 +131,10 @@ def _records(name: str, records: Sequence[dict[str, Any]]) -> dict[str, Reader]:
     for key, values in columns.items():
         column = f"{name}.{key}" if name else key
         if len(values) == n:
-            found |= _columns(column, values)
+            _add(found, _columns(column, values))
         else:
             said = f"expected it in every record, got none in {n - len(values)} of {n}"
-            found[column] = refusing(said)
-        _check_width(len(found))
+            _add(found, {column: refusing(said)})
     return found
 
 
@@ -143,8 +147,7 @@ def _entries(name: str, lists: Sequence[list[Any]]) -> dict[str, Reader]:
     _check_width(lengths[0])
     found: dict[str, Reader] = {}
     for k in range(lengths[0]):
-        found |= _columns(f"{name}[{k}]" if name else str(k), [entry[k] for entry in lists])
-        _check_width(len(found))
+        _add(found, _columns(f"{name}[{k}]" if name else str(k), [entry[k] for entry in lists]))
     return found
 
 

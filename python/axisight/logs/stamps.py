@@ -49,7 +49,10 @@ def seconds_from_first(values: NDArray[Any]) -> Floats:
             raise LogError(
                 f"expected ISO 8601 stamps such as {EXAMPLE}, got {shown(reason)}"
             ) from error
-    return np.asarray((dates - dates[0]).total_seconds(), dtype=np.float64)
+    there = dates[dates.notna()]
+    if not len(there):
+        return np.full(len(dates), np.nan)
+    return np.asarray((dates - there[0]).total_seconds(), dtype=np.float64)
 
 
 def _is_missing(value: object) -> bool:

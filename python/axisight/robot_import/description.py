@@ -254,11 +254,12 @@ def _dry_friction(
     if nm <= 0:
         return []
     found: dict[str, Any] = {"name": friction, "axis": axis, moment: nm}
-    bounds = next(p for p in effect_info(friction).parameters if p.name == corner)
-    found[corner] = min(max(law.friction_corner_rad_s / abs(ratio), bounds.lower), bounds.upper)
+    bounds = {p.name: (p.lower, p.upper) for p in effect_info(friction).parameters}
+    told = {corner: law.friction_corner_rad_s / abs(ratio)}
     if law.friction_lead_s > 0:
-        found[LEAD] = law.friction_lead_s
-    return [found]
+        told[LEAD] = law.friction_lead_s
+    # A friction that changes its sign more slowly or sharply than any real one is taken as far as the effect goes.
+    return [found | {name: float(np.clip(x, *bounds[name])) for name, x in told.items()}]
 
 
 def _loaded(mass: Mass | None, payload: Payload | None, end: Pose) -> Mass | None:

@@ -128,6 +128,14 @@ def test_an_axis_that_stands_beside_others_is_set_aside() -> None:
     assert found(position) == {}
 
 
+def test_a_slide_beside_joints_is_looked_at() -> None:
+    """Its travel in metres is a hundredth of theirs in radians."""
+    position = MOTIONS.copy()
+    position[:, 1] *= 2e-3 * np.ptp(position[:, 0]) / np.ptp(position[:, 1])
+    position[3000:, 1] += 0.3 * np.ptp(position[:, 1])
+    assert found(position) == {"position_jumps": "error"}
+
+
 def test_a_glitch_of_an_axis_that_stands_is_an_error() -> None:
     position = MOTIONS.copy()
     position[:, 1] = 0.3 + 1e-6 * RNG.normal(size=len(TIME))

@@ -7,6 +7,7 @@ import pytest
 from axisight.errors import LogError
 from axisight.logs import check_log, parse_column_map, read_log
 from axisight.logs.guessing import guess_columns
+from axisight.logs.stamps import seconds_from_first
 from columns_data import maker_columns, robot
 from logs_data import native_columns, write
 
@@ -48,6 +49,13 @@ def test_dates_of_parquet(tmp_path):
         frame["time_s"] = frame["time_s"].dt.tz_localize(zone)
         frame.to_parquet(tmp_path / f"{name}.parquet")
         assert read_log(tmp_path / f"{name}.parquet").sample_rate_hz == 500.0
+
+
+def test_a_missing_first_date_takes_none_of_the_others():
+    dates = np.array(["NaT", "2024-05-01T00:00:01", "2024-05-01T00:00:03"], dtype="datetime64[ns]")
+    found = seconds_from_first(dates)
+    assert np.isnan(found[0]) and found[1:].tolist() == [0.0, 2.0]
+    assert np.isnan(seconds_from_first(dates[:1])).all()
 
 
 def spoil(k, text):

@@ -125,6 +125,10 @@ def test_a_key_that_stands_twice(tmp_path):
     arrays = load_arrays(written(tmp_path / "b.json", {"a.b": [1, 2], "a": {"b": [1, 2]}}))
     with pytest.raises(LogError, match=r"expected one column of that name, got several"):
         arrays["a.b"]
+    records = [{"a.b": 1, "a": {"b": 2}}, {"a.b": 3, "a": {"b": 4}}]
+    (tmp_path / "c.json").write_text(json.dumps(records))
+    with pytest.raises(LogError, match=r"expected one column of that name, got several"):
+        load_arrays(tmp_path / "c.json")["a.b"]
 
 
 def test_lists_that_are_not_all_as_long(tmp_path):

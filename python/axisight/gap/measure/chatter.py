@@ -60,6 +60,11 @@ def with_chance(
     runs = _apart(view, logs, causes, measure)
     if not runs.mean() < stages.refitted.mean() or at_floor(float(np.sqrt(runs.mean())), floor):
         return stages
+    if stages.after.mean() < runs.mean() and not at_floor(
+        float(np.sqrt(runs.mean())), float(np.sqrt(stages.after.mean()))
+    ):
+        # A simulator that is closer than two runs are is on no other course.
+        return stages
     return replace(stages, floor=runs) if view.followed(found, logs) >= _FOLLOWED else stages
 
 
@@ -90,7 +95,10 @@ def _apart(
 
 
 def _scattered(variant: Variant, share: float, seed: Sequence[int]) -> Variant:
-    """Return the simulator with each number moved by a normal random share of itself; within the effect's limits."""
+    """Return the simulator with each size moved by a normal random share of itself, within the effect's limits.
+
+    Shapes stay: a thousandth of the order of a ripple is a turn over many waves.
+    """
     rng = np.random.default_rng(seed)
 
     def moved(value: float) -> float:
@@ -99,10 +107,11 @@ def _scattered(variant: Variant, share: float, seed: Sequence[int]) -> Variant:
     own = {name: moved(value) for name, value in variant.robot_values.items()}
     effects = []
     for effect in variant.effects:
-        limits = {p.name: (p.lower, p.upper) for p in effect_info(effect.name).parameters}
+        sizes = {p.name: p for p in effect_info(effect.name).parameters if p.role == "amplitude"}
         values = {
-            name: float(np.clip(moved(value), *limits[name]))
+            name: float(np.clip(moved(value), sizes[name].lower, sizes[name].upper))
             for name, value in (effect.parameters or {}).items()
+            if name in sizes
         }
         effects.append(effect.with_values(values))
     return Variant(own, tuple(effects))

@@ -43,6 +43,8 @@ def begins_elsewhere(
     above = fitted.loss - floor
     for log in range(len(logs)):
         mine = fitted.log == log
+        if not np.any(mine & ~first):
+            return False
         begun, later = (_mean(above, fitted, mine & part) for part in (first, ~first))
         if begun <= max(_STANDS_OUT * later, settings.largest_scatter):
             return False

@@ -1,8 +1,8 @@
-"""Puts what every machine has before what few have: friction and rotors before another arm.
+"""Puts what every machine has before what few have: friction and rotors before another arm or a rarer friction.
 
 A model file often states no friction and no rotors. A fit of the arm alone then takes them up: a third of a metre of
-wrist turns the inertia of two rotors into geometry. By inverse dynamics the errors of axes add up, so that what an axis
-lacks can be added first, and the arm is judged by what is left.
+wrist turns the inertia of two rotors into geometry, and drag takes the place of viscous friction. By inverse dynamics
+the errors of axes add up, so that what an axis lacks can be added first, and the rest is judged by what is left.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from axisight.effects import Effect, effect_info
-from axisight.effects.stated import EVERY_MACHINE
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 
@@ -18,23 +17,30 @@ from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 def ordinary_first(
     standing: AxisPosterior, fitter: ModelFitter, is_cause: Callable[[RankedHypothesis], bool]
 ) -> AxisPosterior:
-    """Return the posterior without the effects of the arm that lead it, where its axis lacks what every machine has.
+    """Return the posterior without the leaders that give way to what every machine has and the simulator lacks.
 
-    Unchanged in closed loop, and where nothing that the axis lacks is a cause. Effects of the axis itself stay, and may
-    lead.
+    Effects of the arm give way, and so does another friction of the axis, which may still be added later. Unchanged in
+    closed loop, and where nothing that the axis lacks is a cause. Other effects of the axis may lead.
     """
-    if not fitter.adds_up or not _of_the_arm(standing.best):
+    if not fitter.adds_up:
         return standing
     lacked = (r for r in standing.ranked if is_lacked(r, standing.axis, fitter) and is_cause(r))
     first = next(lacked, None)
-    if first is None:
+    if first is None or not _gives_way(standing.best, first, standing.axis, fitter):
         return standing
     ahead = standing.ranked[: standing.ranked.index(first)]
-    return standing.without(*(r.trial.label for r in ahead if _of_the_arm(r)))
+    gone = (r for r in ahead if _gives_way(r, first, standing.axis, fitter))
+    return standing.without(*(r.trial.label for r in gone))
 
 
-def _of_the_arm(one: RankedHypothesis) -> bool:
-    return effect_info(one.trial.hypothesis.effect.name).acts in ("arm", "base")
+def _gives_way(
+    one: RankedHypothesis, ordinary: RankedHypothesis, axis: int, fitter: ModelFitter
+) -> bool:
+    info = effect_info(one.trial.hypothesis.effect.name)
+    if info.acts in ("arm", "base"):
+        return True
+    same = info.family == effect_info(ordinary.trial.hypothesis.effect.name).family
+    return same and not is_lacked(one, axis, fitter)
 
 
 def is_lacked(one: RankedHypothesis, axis: int, fitter: ModelFitter) -> bool:
@@ -46,7 +52,8 @@ def is_lacked(one: RankedHypothesis, axis: int, fitter: ModelFitter) -> bool:
     if not fitter.adds_up or effect.axis != axis + 1:
         return False
     names = {effect.name, *effect_info(effect.name).parts}
-    return any(_none_stated(Effect(x, effect.axis), fitter) for x in names & {*EVERY_MACHINE})
+    ordinary = (x for x in names if effect_info(x).on_every_machine)
+    return any(_none_stated(Effect(x, effect.axis), fitter) for x in ordinary)
 
 
 def _none_stated(effect: Effect, fitter: ModelFitter) -> bool:

@@ -56,7 +56,7 @@ class Proposal:
       effect of the library explains the axis.
     - ``leeway``: share of the explained loss that a replacement may leave more, for its formula error.
     - ``as_entered``: a replacement keeps the probability that it had when the cause was added.
-    - ``never_stays``: the causes go out, however likely they are.
+    - ``never_stays``: the causes give way to a replacement, however likely they are.
     """
 
     axis: int
@@ -98,7 +98,8 @@ def decided(context: Context, proposal: Proposal) -> Decision | None:
     rivals = [t for one in proposal.instead if (t := contest.tried(rest, one)) is not None]
     if proposal.gone[:-1]:
         return contest.one_for(present, rivals)
-    standing = contest.standing([*([] if proposal.never_stays else [present]), *rivals])
+    goes = proposal.never_stays and rivals
+    standing = contest.standing(rivals if goes else [present, *rivals])
     if standing is not None and rivals:
         standing = contest.standing(contest.with_second_fits(standing, present))
     if proposal.or_none == "doubtful" and (standing is None or _is_none(standing)):

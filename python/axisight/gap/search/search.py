@@ -195,7 +195,8 @@ def _taken(
             interact(one, mine, led.axis, fall) or interact(mine, one, axis, fall)
             for one, axis in leaders
         )
-        if not felt and _earns_its_gain(round_.fitter, led.best, state.model, least[led.axis]):
+        enough = _least_fall(led.best, led.axis, round_.fitter, state, settings)
+        if not felt and _earns_its_gain(round_.fitter, led.best, state.model, enough):
             leaders.append((mine, led.axis))
             found += named_simply(led, round_.fitter, state)
     if not found and round_.fitter.adds_up:
@@ -292,6 +293,22 @@ def _led_by_a_cause(
     return None
 
 
+def _least_fall(
+    one: RankedHypothesis,
+    axis: int,
+    fitter: ModelFitter,
+    state: SearchState,
+    settings: Settings,
+) -> float:
+    """Return the least fall of the loss on an axis (from 0) for a cause.
+
+    What every machine has and the simulator lacks may be small beside the other causes.
+    """
+    if is_lacked(one, axis, fitter):
+        return settings.smallest_gain * float(state.layout.samples()[axis])
+    return float(state.least_falls(settings)[axis])
+
+
 def _is_cause(
     best: RankedHypothesis,
     standing: AxisPosterior,
@@ -310,10 +327,8 @@ def _is_cause(
     all_tried = normal_deviate(settings.false_alarms / max(2 * tried, 1))
     alone = normal_deviate(settings.false_alarms / 2)
     needed = alone if expected else max(settings.significance, all_tried)
-    samples = float(state.layout.samples()[standing.axis])
-    fall = best.gain * samples
-    least = float(state.least_falls(settings)[standing.axis])
-    least = settings.smallest_gain * samples if expected else least
+    fall = best.gain * float(state.layout.samples()[standing.axis])
+    least = _least_fall(best, standing.axis, fitter, state, settings)
     large = fall > least and not state.mends(best.trial)
     worth = large and best.score > settings.smallest_score
     return best.significance > needed and worth and standing.best.probability > standing.p_none

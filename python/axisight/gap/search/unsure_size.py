@@ -21,7 +21,7 @@ def size_is_sure(model: FittedModel, place: int) -> bool:
 
 
 def unsure(context: Context) -> Iterator[Proposal]:
-    """Propose the rivals of each cause whose size is not sure, or none; the cause itself does not stay.
+    """Propose the rivals of each cause whose size is not sure; without rivals it stays where it is likelier than none.
 
     Such a cause explains the logs by several numbers that make up for one another. A law with fewer numbers, whose size
     is sure, may explain them as well.

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from axisight.gap.facts.result import Candidate
 from axisight.gap.facts.trace import NONE, UNKNOWN, Adjustment, log_odds
+from axisight.gap.ranking.posterior import TINY
 from axisight.gap.verdict.conclusion import Conclusion
 
 # Least probability of *none* or *unknown* where it is the verdict.
@@ -26,7 +27,7 @@ def in_agreement(conclusion: Conclusion) -> Conclusion:
     if conclusion.verdict != "unknown" or conclusion.p_unknown >= _LEAST:
         return conclusion
     rest = _rest(conclusion.p_unknown)
-    entry = Adjustment("verdict", UNKNOWN, log_odds(1.0 / rest))
+    entry = _raised(UNKNOWN, conclusion.p_unknown, _LEAST, rest)
     return replace(
         _scaled(conclusion, rest),
         p_none=rest * conclusion.p_none,
@@ -42,14 +43,20 @@ def _led_by_none(conclusion: Conclusion) -> Conclusion:
     entries = []
     if conclusion.p_unknown > 0:
         entries.append(Adjustment("verdict", UNKNOWN, log_odds(0.0)))
-    if rest != 1.0:
-        entries.append(Adjustment("verdict", NONE, log_odds(1.0 / rest)))
+    if kept != conclusion.p_none:
+        entries.append(_raised(NONE, conclusion.p_none, kept, rest))
     return replace(
         _scaled(conclusion, rest),
         p_none=kept,
         p_unknown=0.0,
         ledger=(*conclusion.ledger, *entries),
     )
+
+
+def _raised(hypothesis: str, before: float, after: float, rest: float) -> Adjustment:
+    """Return the entry of a hypothesis whose probability rises while that of the others falls by a factor ``rest``."""
+    odds = after / (max(before, TINY) * max(rest, TINY))
+    return Adjustment("verdict", hypothesis, log_odds(odds))
 
 
 def _rest(leader: float) -> float:

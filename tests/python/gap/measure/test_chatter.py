@@ -68,6 +68,18 @@ def test_a_thousandth_of_a_number_makes_another_run():
     assert seen.floor.mean() == pytest.approx(0.01 + 0.05)
     again = judged(0.055, runs=0.01, torque=two_courses)[1]
     assert np.array_equal(again.floor.blocks, seen.floor.blocks)
+    # A simulator that is closer than two runs are is on no other course, whatever its numbers make of the torque.
+    stages, seen = judged(0.03, runs=0.01, torque=two_courses)
+    assert seen is stages
+    # A thousandth of the order of a ripple is a turn over many waves: shapes stay.
+    ripple = Variant({}, (Effect("torque_ripple", 1, {"order_1": 12.0, "cosine_1_nm": 0.5}),))
+    stages, seen = judged(
+        0.055,
+        runs=0.01,
+        causes=ripple,
+        torque=lambda v: 0.05 if v.effects[0].parameters["order_1"] != 12.0 else 0.0,
+    )
+    assert seen is stages
     # A torque in proportion to the number is no chaos.
     stages, seen = judged(
         0.055, runs=0.01, torque=lambda v: 1e-4 * v.effects[0].parameters["half_width_rad"] / 1e-4

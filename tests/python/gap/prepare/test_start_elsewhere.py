@@ -62,6 +62,15 @@ def test_a_swing_that_all_logs_share_is_a_start_elsewhere(name, effects):
     assert not begins_elsewhere(ROBOT, same, fitted, floor, SETTINGS)
 
 
+def test_a_log_of_one_block_tells_nothing():
+    made = [log.part(0.0, 1.2) for log in logs([], CASES["one swing"][0])]
+    view = ClosedLoopView(ROBOT, made, SETTINGS)
+    fitted = must_hold(view.fitter.fit([]))
+    floor = view.floor.expected[fitted.axis] * fitted.samples
+    one = not any((fitted.log == k).sum() > 1 for k in range(len(made)))
+    assert not (one and begins_elsewhere(ROBOT, made, fitted, floor, SETTINGS))
+
+
 def test_logs_are_compared_where_the_start_is_forgotten():
     made = logs([], lambda log, _: log)
     later = compared_later(loops_of(ROBOT), made)

@@ -49,6 +49,14 @@ def test_an_arm_gives_way_to_what_its_axis_lacks():
     assert {a.rule for a in after.ledger} == {"not_a_cause"}
 
 
+def test_a_rarer_friction_gives_way_too():
+    """It may be added beside the ordinary one; a composite of which that is a part does not give way."""
+    before = standing(4, "quadratic_drag@4", "asymmetric_friction@4", "viscous_friction@4")
+    after = ordinary_first(before, fitter(BARE), lambda _: True)
+    labels = [r.trial.label for r in after.ranked]
+    assert labels == ["asymmetric_friction@4", "viscous_friction@4"]
+
+
 @pytest.mark.parametrize(
     ("labels", "robot", "adds_up", "is_cause"),
     [

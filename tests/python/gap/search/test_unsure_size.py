@@ -11,7 +11,7 @@ from axisight.fitting.divergence import must_hold
 from axisight.gap.fit.data_blocks import layout_of
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.ranking.intervals import of_sure_size
-from axisight.gap.search.contest import Context, decided
+from axisight.gap.search.contest import Context, Proposal, decided
 from axisight.gap.search.state import SearchState
 from axisight.gap.search.unsure_size import size_is_sure, unsure
 from axisight.gap.views.closed_loop import ClosedLoopView
@@ -70,6 +70,13 @@ def test_it_goes_out_and_the_other_stays(searched, monkeypatch):
     decision = decided(context, proposal)
     assert decision is not None and decision.standing is None
     assert [f.effect.label for f in decision.model.free] == ["coulomb_friction@1"]
+
+
+def test_without_rivals_a_cause_that_explains_the_logs_stays(searched):
+    context, state = searched
+    (friction, _) = state.model.free
+    proposal = Proposal(0, (friction,), (), "doubtful", never_stays=True)
+    assert decided(context, proposal) is None
 
 
 def of_trial(label: str):

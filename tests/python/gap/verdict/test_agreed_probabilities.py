@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -40,9 +42,23 @@ def test_causes_that_validation_contradicts_are_not_likely():
     after = in_agreement(concluded("unknown", [0.999, 0.001], 0.0, 1e-16))
     assert shares(after) == pytest.approx([0.04995, 0.00005, 0.0, 0.95])
     (entry,) = after.ledger
-    # From nothing to 19 to one against all others together.
     assert (entry.rule, entry.hypothesis) == ("verdict", "unknown")
-    assert entry.nats == pytest.approx(2.9957, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "none", "unknown"),
+    [("unknown", 0.3, 0.5), ("none", 0.1, 0.1), ("none", 0.14, 0.81), ("none", 0.5, 0.0)],
+)
+def test_the_ledger_gives_the_probabilities_that_are_told(verdict, none, unknown):
+    """Weights times exp of the entries, normalised."""
+    before = concluded(verdict, [1 - none - unknown], none, unknown)
+    after = in_agreement(before)
+    weights = {"backlash@1": before.ranking[0].probability, "none": none, "unknown": unknown}
+    for entry in after.ledger:
+        weights[entry.hypothesis] *= math.exp(entry.nats)
+    whole = sum(weights.values())
+    told = [after.ranking[0].probability, after.p_none, after.p_unknown]
+    assert [w / whole for w in weights.values()] == pytest.approx(told)
 
 
 def test_scatter_of_the_simulator_is_none():
