@@ -180,3 +180,8 @@ WITH_MEMORY = frozenset(
 
 DEMONSTRATION = Effect("coulomb_friction", 2, {"coulomb_nm": 0.6, "smoothing_rad_s": 0.08})
 """The effect that the machine of the demonstration has and its simulator lacks."""
+
+
+def on_every_machine(name: str) -> bool:
+    """Return whether every axis of a machine has an effect, although a model file may leave it out."""
+    return name in (VISCOUS_FRICTION, DRY_FRICTION[0], ROTOR)

@@ -71,9 +71,6 @@ class EffectParameter:
         return half_normal(value, self.neutral, self.typical, bounds)
 
 
-_ON_EVERY_MACHINE = ("viscous_friction", "coulomb_friction", "rotor_inertia")
-
-
 @summarized
 @dataclass(frozen=True)
 class EffectInfo:
@@ -141,11 +138,6 @@ class EffectInfo:
     unrepeatable: bool
     absorbed_by: tuple[str, ...]
     shown_by: tuple[str, ...]
-
-    @property
-    def on_every_machine(self) -> bool:
-        """Whether every axis of a machine has the effect, although a model file may leave it out."""
-        return self.name in _ON_EVERY_MACHINE
 
     parameters: tuple[EffectParameter, ...]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from axisight.effects import Effect, effect_info
+from axisight.effects import Effect, effect_info, on_every_machine
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 
@@ -52,7 +52,7 @@ def is_lacked(one: RankedHypothesis, axis: int, fitter: ModelFitter) -> bool:
     if not fitter.adds_up or effect.axis != axis + 1:
         return False
     names = {effect.name, *effect_info(effect.name).parts}
-    ordinary = (x for x in names if effect_info(x).on_every_machine)
+    ordinary = (x for x in names if on_every_machine(x))
     return any(_none_stated(Effect(x, effect.axis), fitter) for x in ordinary)
 
 
