@@ -54,16 +54,17 @@ def with_chance(
 
     ``measure``: returns the stage of torque errors (n, n_axes) [Nm] of each log.
     """
-    floor = float(np.sqrt(stages.floor.mean()))
-    if not causes.effects or at_floor(float(np.sqrt(stages.after.mean())), floor):
+    floor, after = (float(np.sqrt(s.mean())) for s in (stages.floor, stages.after))
+    if not causes.effects or at_floor(after, floor):
         return stages
     runs = _apart(view, logs, causes, measure)
-    if not runs.mean() < stages.refitted.mean() or at_floor(float(np.sqrt(runs.mean())), floor):
-        return stages
-    if stages.after.mean() < runs.mean() and not at_floor(
-        float(np.sqrt(runs.mean())), float(np.sqrt(stages.after.mean()))
+    apart = float(np.sqrt(runs.mean()))
+    # A simulator that is closer than two runs are is on no other course.
+    if (
+        not runs.mean() < stages.refitted.mean()
+        or at_floor(apart, floor)
+        or not at_floor(apart, after)
     ):
-        # A simulator that is closer than two runs are is on no other course.
         return stages
     return replace(stages, floor=runs) if view.followed(found, logs) >= _FOLLOWED else stages
 

@@ -61,7 +61,7 @@ def _raised(hypothesis: str, before: float, after: float, rest: float) -> Adjust
 
 def _rest(leader: float) -> float:
     """Return the factor of all other probabilities if the leader's rises to the least that it may have."""
-    return (1.0 - _LEAST) / max(1.0 - leader, 1e-300)
+    return (1.0 - _LEAST) / max(1.0 - leader, TINY)
 
 
 def _scaled(conclusion: Conclusion, times: float) -> Conclusion:
