@@ -438,6 +438,11 @@ class Robot:
 
         None is the operating point; elastic joints settle under gravity.
         """
+    def stable_substeps(self, effects: _Effects) -> int:
+        """Steps of Runge-Kutta (order 4) per sample that stay stable near standstill, at most 16.
+
+        Dry friction that changes its sign within a small speed needs more than one.
+        """
     def linearize(
         self, effects: _Effects, joint_angle: _Numbers | None = None
     ) -> tuple[_Array, _Array, _Array]:

@@ -4,12 +4,13 @@ use crate::convert::{array1, array2, array3, matrix, rows};
 use crate::effects::{EffectTuple, settings, tuple};
 use crate::entry::{AxisightError, RobotError, input_error};
 use axisight_core::plant::{
-    Linearization, assemble, equilibrium, linearize, zoh_frequency_response,
+    Linearization, assemble, equilibrium, linearize, stable, zoh_frequency_response,
 };
 use axisight_core::robot::{
     Controller, Joint, Known, Motion, Parameter, RigidBody, RobotDescription, ShapeError,
 };
 use axisight_core::robot_file::read_robot;
+use axisight_core::simulation::Method;
 use axisight_identification::frequency::modes;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -528,6 +529,16 @@ impl Robot {
         out.set_item("motor_angle", array1(py, rest.motor_angle))?;
         out.set_item("motor_torque", array1(py, rest.motor_torque))?;
         Ok(out)
+    }
+
+    /// Steps of Runge-Kutta per sample that stay stable near standstill.
+    fn stable_substeps(&self, effects: Vec<EffectTuple>) -> PyResult<usize> {
+        let once = Method::RungeKutta4 { substeps: 1 };
+        let found = stable(once, &self.description, &settings(effects)).map_err(input_error)?;
+        Ok(match found {
+            Method::RungeKutta4 { substeps } => substeps,
+            _ => 1,
+        })
     }
 
     #[pyo3(signature = (effects, joint_angle=None))]

@@ -340,6 +340,13 @@ class Robot:
         """
         return self._with_core(self.core.with_effects(core_effects(self.placed(effects))))
 
+    def stable_substeps(self, effects: Iterable[Effect] = ()) -> int:
+        """Return how many fixed steps of ``"rk4"`` a sample needs to be stable near standstill, from 1 to 16.
+
+        Dry friction that changes its sign within a small speed needs more than one.
+        """
+        return self.core.stable_substeps(core_effects(self.placed(effects)))
+
     def placed(self, effects: Iterable[Effect]) -> list[Effect]:
         """Return effects with axis numbers in place of joint names.
 

@@ -9,7 +9,7 @@ from test_computed_torque import arm
 from test_explore_modes import SAMPLE, logs_of
 
 from axisight import Settings, diagnose, plot_overlay
-from axisight.gap.prepare.held_commands import held_commands, where_they_act
+from axisight.gap.prepare.torque_clock import torque_clock, where_they_act
 from axisight.logs import lowpass
 from axisight.report import render_report
 
@@ -26,9 +26,9 @@ def found(request, tmp_path_factory):
     if request.param == "positions":
         return diagnosis, logs[2]
     # The engine holds commands: torques are compared, and drawn, where they act.
-    held = held_commands(robot, logs)
-    assert held is not None and any(held.says() == check for check in diagnosis.checks)
-    return diagnosis, where_they_act(logs, held)[2]
+    clock = torque_clock(robot, logs)
+    assert clock is not None and any(clock.says() == check for check in diagnosis.checks)
+    return diagnosis, where_they_act(logs, clock)[2]
 
 
 def test_rms_that_is_drawn_is_the_gap_of_the_table(found):

@@ -2,7 +2,7 @@
 
 use crate::effects::{self, EffectError, EffectInfo};
 use crate::robot::{EffectSetting, Parameter, RobotDescription};
-use crate::simulation::Stepper;
+use crate::simulation::{Method, Stepper};
 use axisight_plant::plant::{
     self, Linearization, LinearizationError, PlacedKernel, Plant, PlantError,
 };
@@ -50,6 +50,19 @@ pub fn linearize(
 ) -> Result<Linearization, LinearizationError> {
     let plain = assemble(robot, &[], settings)?;
     plant::linearize(&plain, &seeded(robot, settings)?, driven)
+}
+
+/// `method` for `robot` with `settings`, with more fixed sub-steps if its own are unstable.
+///
+/// # Errors
+/// [`PlantError`] as for [`assemble`].
+pub fn stable(
+    method: Method,
+    robot: &RobotDescription,
+    settings: &[EffectSetting<f64>],
+) -> Result<Method, PlantError> {
+    let decay = plant::fastest_decay(&seeded(robot, settings)?);
+    Ok(method.stable_at(decay, robot.sample_time))
 }
 
 /// Integrator of `plant`, which must be that of `robot` with `settings`, for any method.

@@ -2,8 +2,8 @@
 
 mod assemble;
 
-pub use assemble::{assemble, linearize, stepper};
+pub use assemble::{assemble, linearize, stable, stepper};
 pub use axisight_plant::plant::{
     Axis, Equilibrium, EquilibriumError, Gear, Linearization, LinearizationError, PlacedKernel,
-    Plant, PlantError, equilibrium, zoh_frequency_response,
+    Plant, PlantError, Seeded, equilibrium, fastest_decay, zoh_frequency_response,
 };

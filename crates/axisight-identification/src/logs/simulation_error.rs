@@ -17,7 +17,7 @@ use super::problem::{
     Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, picked, seeded,
 };
 use super::record::Record;
-use axisight_core::plant::{Plant, assemble};
+use axisight_core::plant::{Plant, Seeded, assemble, fastest_decay};
 use axisight_core::robot::{Course, EffectSetting, RobotDescription};
 use axisight_core::simulation::{Drive, Method, Run, Sample, Status, Stepper, simulate};
 use axisight_numerics::Weighting;
@@ -170,6 +170,12 @@ impl SimulationErrorProblem {
         self.plant(theta, &[], |number, _| number)
     }
 
+    /// The method, with shorter steps if friction turns sharply.
+    fn steps_at(&self, theta: &[f64]) -> Result<Method, ProblemError> {
+        let decay = fastest_decay(&self.bare::<Seeded>(theta)?);
+        Ok(self.method.stable_at(decay, self.robot.sample_time))
+    }
+
     /// Whether the arm may be linearised along runs.
     pub(super) fn follows_courses(&self, theta: &[f64]) -> Result<bool, ProblemError> {
         Ok(self.method.has_fixed_steps() && self.bare::<f64>(theta)?.follows_courses())
@@ -186,7 +192,14 @@ impl SimulationErrorProblem {
             states.extend_from_slice(&x[rates.clone()]);
         };
         let mut stepper = Stepper::new(&plant);
-        let traces = self.traces(records, &plant, &mut stepper, 0, Some(&mut keep))?;
+        let traces = self.traces(
+            records,
+            &plant,
+            &mut stepper,
+            0,
+            self.steps_at(theta)?,
+            Some(&mut keep),
+        )?;
         let output = traces.into_iter().flatten().collect();
         let time = self.robot.sample_time;
         Ok(OwnRun::new(output, plant.chain, time, states))
@@ -200,6 +213,7 @@ impl SimulationErrorProblem {
         plant: &Plant<S>,
         stepper: &mut Stepper<S>,
         n_seeds: usize,
+        method: Method,
         mut keep: Option<Keep<'_, S>>,
     ) -> Result<Traces, ProblemError> {
         let n_axes = plant.axes.len();
@@ -238,7 +252,7 @@ impl SimulationErrorProblem {
             noise: &[],
             resolution: 0.0,
             disturbances: false,
-            method: self.method,
+            method,
             cancel: self.cancel.as_deref(),
         };
         let mut observe = |sample: &Sample<'_, S>| {
@@ -301,7 +315,14 @@ impl SimulationErrorProblem {
             Arm::Exact => Stepper::new(&plant),
             Arm::Along(course) => Stepper::along(&plant, course)?,
         };
-        self.traces(records, &plant, &mut stepper, seeds.len(), None)
+        self.traces(
+            records,
+            &plant,
+            &mut stepper,
+            seeds.len(),
+            self.steps_at(theta)?,
+            None,
+        )
     }
 
     /// Whitened series of one batch: `[quantity][lane][axis]`, residual first.

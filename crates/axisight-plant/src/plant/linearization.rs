@@ -1,5 +1,6 @@
 //! Linearization about an operating point, with exact derivatives.
 
+use super::axis::Axis;
 use super::build::PlantError;
 use super::equations::Plant;
 use super::equilibrium::{Equilibrium, EquilibriumError, equilibrium};
@@ -102,4 +103,33 @@ pub fn linearize(
         c,
         equilibrium: rest,
     })
+}
+
+/// The fastest decay of the speed of a motor near standstill [1/s], with all angles zero.
+///
+/// It is the largest `-d(acceleration)/d(speed)`. Dry friction that changes its sign within a small
+/// speed makes it large, which limits the steps of explicit methods.
+pub fn fastest_decay(plant: &Plant<Seeded>) -> f64 {
+    let mut scratch = plant.scratch();
+    let torque = vec![D::zero(); plant.axes.len()];
+    let mut dx = vec![D::zero(); plant.n_states()];
+    let rate_of = |axis: &Axis<D>| {
+        let slot = axis.gear.as_ref().map(|gear| gear.slot);
+        plant.n_angles() + slot.unwrap_or(plant.n_motors() + axis.joint)
+    };
+    let rates: Vec<usize> = plant.axes.iter().map(rate_of).collect();
+    let mut fastest = 0.0;
+    for rates in rates.chunks(WIDTH) {
+        let mut x = vec![D::zero(); plant.n_states()];
+        for (seed, rate) in rates.iter().enumerate() {
+            x[*rate] = D::zero().seeded(seed);
+        }
+        plant.derivative(&x, &torque, &torque, &mut scratch, &mut dx);
+        let decays = rates
+            .iter()
+            .enumerate()
+            .map(|(seed, rate)| -dx[*rate].partials[seed]);
+        fastest = decays.fold(fastest, f64::max);
+    }
+    fastest
 }

@@ -60,6 +60,32 @@ impl Method {
         matches!(self, Self::RungeKutta4 { .. } | Self::Nystrom4 { .. })
     }
 
+    /// The same method with more fixed sub-steps if its own are unstable at `decay` [1/s]
+    /// ([`crate::plant::fastest_decay`]); methods with error control shorten their steps themselves.
+    ///
+    /// An unstable speed near standstill stays bounded, since friction has a largest value. Its
+    /// derivatives grow without bound.
+    #[must_use]
+    pub fn stable_at(self, decay: f64, sample_time: f64) -> Self {
+        // The boundary on the real axis is 2.8 for Runge-Kutta of order 4.
+        const LONGEST: f64 = 2.0;
+        const MOST: usize = 16;
+        // Limited to a small number.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let needed = (decay * sample_time / LONGEST)
+            .ceil()
+            .clamp(1.0, MOST as f64) as usize;
+        match self {
+            Self::RungeKutta4 { substeps } => Self::RungeKutta4 {
+                substeps: substeps.max(needed),
+            },
+            Self::Nystrom4 { substeps } => Self::Nystrom4 {
+                substeps: substeps.max(needed),
+            },
+            other => other,
+        }
+    }
+
     /// Whether the method may need the Jacobian of [`Stepper::with_jacobian`].
     pub fn may_be_implicit(self) -> bool {
         matches!(

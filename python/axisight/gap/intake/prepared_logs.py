@@ -18,12 +18,12 @@ from axisight.gap.intake import user_simulator
 from axisight.gap.intake.start_of_logs import from_rest, loops_of
 from axisight.gap.measure.gear_deflections import gears_seen, gears_that_differ
 from axisight.gap.prepare.currents import Nominal, in_torques
-from axisight.gap.prepare.held_commands import HeldCommands, held_commands, where_they_act
 from axisight.gap.prepare.position_targets import Commanded, with_commands
 from axisight.gap.prepare.reconstructed_references import SAYS, with_references
 from axisight.gap.prepare.start_elsewhere import begins_elsewhere, compared_later
 from axisight.gap.prepare.start_elsewhere import said as begins_elsewhere_said
 from axisight.gap.prepare.stiff_bristles import with_bristles_followed
+from axisight.gap.prepare.torque_clock import TorqueClock, torque_clock, where_they_act
 from axisight.gap.simulator.own_parameters import constant_name
 from axisight.gap.simulator.start_poses import SAYS as FROM_OWN_POSES
 from axisight.gap.simulator.start_poses import at_their_poses
@@ -46,7 +46,7 @@ class PreparedLogs:
     - ``simulator``: how well the robot reproduces the user's own simulator, once that has been compared.
     - ``beside``: logs of the user's own simulator, cut like the measured ones.
     - ``in_mujoco``: whether these are runs in MuJoCo that the diagnosis made itself.
-    - ``held``: by how much torques act later than they were logged, where that was corrected.
+    - ``clock``: by how much torques act later than they were logged, where that was corrected.
     """
 
     robot: Robot
@@ -58,7 +58,7 @@ class PreparedLogs:
     nominal: tuple[Nominal, ...] = ()
     simulator: Reproduction | None = None
     beside: tuple[Log, ...] = ()
-    held: HeldCommands | None = None
+    clock: TorqueClock | None = None
     in_mujoco: bool = False
 
     def view(self, settings: Settings) -> View:
@@ -142,7 +142,7 @@ class PreparedLogs:
             "" if self.simulator is None else user_simulator.said(self.simulator, compared),
             FROM_OWN_POSES if own_poses and mode == "closed_loop" else "",
             SAYS if self.recovered else "",
-            "" if self.held is None else self.held.says(),
+            "" if self.clock is None else self.clock.says(),
         ]
         return (*filter(None, said), *gears_seen(self.robot, [*self.estimation, *self.validation]))
 
@@ -186,10 +186,12 @@ def behind_gate(
     noted = (*found, *noted, *gears_that_differ(robot, logs))
     # Logs of the user's own simulator may hold their commands, too: the difference of both is compared.
     inverse = commanded is None and not beside and not is_closed_loop(robot, logs)
-    held = held_commands(robot, logs) if inverse else None
-    if held is not None:
-        logs = where_they_act(logs, held)
-        noted = tuple(f for f in noted if f.name != "time_shifted" or f.axis is not None)
+    clock = torque_clock(robot, logs) if inverse else None
+    if clock is not None:
+        logs = where_they_act(logs, clock)
+        # Nothing is wrong with commands that are held; late torques are a matter of the recorder.
+        if clock.acts_later_s > 0:
+            noted = tuple(f for f in noted if f.name != "time_shifted" or f.axis is not None)
     return PreparedLogs(
         robot,
         logs[:n],
@@ -199,6 +201,6 @@ def behind_gate(
         recovered is not None,
         read.nominal,
         beside=tuple(beside),
-        held=held,
+        clock=clock,
         in_mujoco=bool(in_mujoco),
     )

@@ -77,6 +77,8 @@ def _runs(
         _padded([_reference(log) for log in logs]),
         effects=effects,
         method="rk4",
+        # Fits take the same steps.
+        substeps=robot.stable_substeps(effects),
         noise=None if noise is None else _padded(noise),
         start_rad=starts_of(robot, logs),
         threads=threads,

@@ -11,7 +11,7 @@ from axisight.fitting.divergence import must_hold
 from axisight.gap.fit.data_blocks import layout_of
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.ranking.intervals import of_sure_size
-from axisight.gap.search.contest import Context, Proposal, decided
+from axisight.gap.search.contest import Alternative, Context, Proposal, decided
 from axisight.gap.search.state import SearchState
 from axisight.gap.search.unsure_size import size_is_sure, unsure
 from axisight.gap.views.closed_loop import ClosedLoopView
@@ -76,6 +76,14 @@ def test_without_rivals_a_cause_that_explains_the_logs_stays(searched):
     context, state = searched
     (friction, _) = state.model.free
     proposal = Proposal(0, (friction,), (), "doubtful", never_stays=True)
+    assert decided(context, proposal) is None
+
+
+def test_a_rival_that_explains_nothing_does_not_push_it_out(searched):
+    context, state = searched
+    (friction, _) = state.model.free
+    rival = Hypothesis(Effect("torque_offset", 1, {"offset_nm": 0.0}), ("offset_nm",))
+    proposal = Proposal(0, (friction,), (Alternative(rival),), "doubtful", never_stays=True)
     assert decided(context, proposal) is None
 
 

@@ -31,8 +31,8 @@ _STEP_RAD = 0.05
 _LEAST_S = 8e-3
 # Smallest offset that is a finding [rad, joint side], above the play of zero marks.
 _LEAST_RAD = 0.03
-# Largest delay [s]; a larger one is not of first order, and has another cause.
-_MOST_S = 0.2
+MOST_S = 0.2
+"""Largest delay [s]; a larger one is not of first order, and has another cause."""
 # Largest offset [rad, joint side]; a larger one is not of first order, and has another cause.
 _MOST_RAD = 0.6
 # Smallest share of the remaining error that one error must explain. Payloads and other laws of friction explain
@@ -62,7 +62,7 @@ def check_small_errors(
         loads.append(found[len(names) :])
     targets = [target for target, _ in parts]
     shared = [kind == "time_shifted" for kind, _ in names]
-    limits = [_MOST_RAD if kind == "position_offset" else _MOST_S for kind, _ in names]
+    limits = [_MOST_RAD if kind == "position_offset" else MOST_S for kind, _ in names]
     first = _strongest(
         targets, [[part[i] for _, part in parts] for i in range(len(names))], limits, shared
     )

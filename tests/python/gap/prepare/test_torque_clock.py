@@ -1,13 +1,13 @@
-"""Commands that are held act half a sample after they are logged: the time is found on an arm, and corrected."""
+"""Commands that are held act after they are logged, and late torques before: the time is found, and corrected."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from axisight import Robot, diagnose
-from axisight.gap.prepare.held_commands import HeldCommands, held_commands, where_they_act
-from rigid_arm import RATE_HZ, arm, arm_toml, log_of
+from axisight import Effect, Robot, diagnose
+from axisight.gap.prepare.torque_clock import TorqueClock, torque_clock, where_they_act
+from rigid_arm import COULOMB_NM, RATE_HZ, VISCOUS, arm, arm_toml, log_of
 
 STEP_S = 2 / RATE_HZ
 
@@ -37,7 +37,7 @@ def logs(n: int = 3, **kind):
 
 def test_half_a_sample_is_found():
     """Within a tenth: friction reverses with another formula, so that its rate is that of a similar torque."""
-    found = held_commands(robot(), logs())
+    found = torque_clock(robot(), logs())
     assert found is not None
     assert found.acts_later_s == pytest.approx(STEP_S / 2, rel=0.1)
     assert "samples) later than they are logged" in found.says()
@@ -45,11 +45,11 @@ def test_half_a_sample_is_found():
 
 def test_torques_on_the_clock_of_the_motion_are_left_alone():
     plain = [log_of(arm(), seed, seconds=30.0) for seed in (1, 2, 3)]
-    assert held_commands(arm(), plain) is None
+    assert torque_clock(arm(), plain) is None
     # The shift of the corrected logs is gone.
-    found = held_commands(robot(), logs())
+    found = torque_clock(robot(), logs())
     assert found is not None
-    assert held_commands(robot(), where_they_act(logs(), found)) is None
+    assert torque_clock(robot(), where_they_act(logs(), found)) is None
 
 
 @pytest.mark.parametrize(
@@ -63,27 +63,53 @@ def test_torques_on_the_clock_of_the_motion_are_left_alone():
     ids=["one axis", "half the axes", "too far"],
 )
 def test_what_is_no_held_command_is_left_alone(kind):
-    assert held_commands(robot(), logs(**kind)) is None
+    assert torque_clock(robot(), logs(**kind)) is None
 
 
-def test_torques_that_are_late_are_left_alone():
-    """An elastic gear looks like a late torque, on all axes alike."""
-    found = HeldCommands(-STEP_S / 2, STEP_S)
-    assert held_commands(robot(), where_they_act(logs(), HeldCommands(STEP_S, STEP_S))) is None
-    assert found.acts_later_s < 0
+def late(log, rows: int):
+    """Return a log whose torques are written ``rows`` later than they act."""
+    torque = np.concatenate([np.repeat(log.torque_nm[:1], rows, axis=0), log.torque_nm[:-rows]])
+    return replace(log, torque_nm=torque)
+
+
+@pytest.mark.parametrize("rows", [1, 4])
+def test_late_torques_are_found(rows):
+    """Within a tenth, as above; four rows are 40 ms, where one estimate to first order falls short."""
+    found = torque_clock(arm(), [late(log_of(arm(), seed, seconds=30.0), rows) for seed in (1, 2)])
+    assert found is not None
+    assert found.acts_later_s == pytest.approx(-rows / RATE_HZ, rel=0.1)
+    assert "logged" in found.says() and "later than they act" in found.says()
+
+
+def test_late_torques_are_no_viscous_friction():
+    """40 ms add about w^2 M T to the friction of an inertia M, more than the 5 % of its tolerance."""
+    friction = [
+        Effect("coulomb_friction", i + 1, {"coulomb_nm": c, "smoothing_rad_s": 0.002})
+        for i, c in enumerate(COULOMB_NM)
+    ]
+    friction += [
+        Effect("viscous_friction", i + 1, {"viscous_nm_s_rad": v}) for i, v in enumerate(VISCOUS)
+    ]
+    logs_of_it = [late(log_of(arm(), seed, seconds=30.0), 4) for seed in (1, 2, 3, 4)]
+    said = diagnose(
+        robot=arm().with_effects(friction), estimation=logs_of_it[:3], validation=logs_of_it[3:]
+    )
+    assert (said.verdict, said.causes) == ("none", ())
+    assert any("later than they act" in check for check in said.checks)
+    assert "time_shifted" in {f.name for f in said.findings}
 
 
 def test_elastic_arms_are_left_alone():
     gear = 'motion = "revolute"\nstiffness = 1e5\ndamping = 10.0'
     elastic = Robot.from_toml(robot().toml.replace('motion = "revolute"', gear))
     assert not all(elastic.axis_is_rigid)
-    assert held_commands(elastic, logs()) is None
+    assert torque_clock(elastic, logs()) is None
 
 
 def test_torques_are_taken_from_where_they_act():
     """A line is moved to rounding, a wave between the ends to 1e-3, and noise keeps its size at all frequencies."""
     log = logs(1)[0]
-    held_s = HeldCommands(0.3 * STEP_S, STEP_S)
+    held_s = TorqueClock(0.3 * STEP_S, STEP_S)
 
     def moved(signal):
         (out,) = where_they_act([replace(log, torque_nm=np.tile(signal[:, None], 6))], held_s)

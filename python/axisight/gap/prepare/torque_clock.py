@@ -1,8 +1,8 @@
-"""Puts held commands on the clock of the motion, where torques of a rigid arm are compared by inverse dynamics.
+"""Puts torques on the clock of the motion, where those of a rigid arm are compared by inverse dynamics.
 
-A command is held from one sample to the next: on average it acts half a sample later than it is logged. By inverse
-dynamics a shift s acts like viscous friction, of about -w^2 M s for an inertia M at an angular frequency w. Unlike
-friction it follows the rate of the torque, and is the same on all axes.
+A command is held from one sample to the next: on average it acts half a sample later than it is logged. A measured
+torque may be logged late. By inverse dynamics a shift s acts like viscous friction, of about -w^2 M s for an inertia M
+at an angular frequency w. Unlike friction it follows the rate of the torque, and is the same on all axes.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.gate.by_dynamics.inverse_checks import thinned
+from axisight.gap.gate.by_dynamics.small_errors import MOST_S
 from axisight.gap.gate.by_dynamics.torque_fit import ALIKE, PARTS, SIGNIFICANT, nuisance
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from axisight.gap.signals.motion import Motion
@@ -22,27 +23,37 @@ from axisight.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Range of the time [samples] by which a held command acts later than it is logged. A drive's delay is another one.
+# Range of the time [samples] by which a held command acts later than it is logged. A drive's delay is another one. Late
+# torques count from the same part of a sample.
 _SAMPLES = (0.3, 0.7)
 
 
 @dataclass(frozen=True)
-class HeldCommands:
-    """How much later torques act than they are logged [s], on all axes; ``sample_time_s`` of the logs [s]."""
+class TorqueClock:
+    """How much later torques act than they are logged [s], on all axes; negative if they are logged late.
+
+    ``sample_time_s`` of the logs [s].
+    """
 
     acts_later_s: float
     sample_time_s: float
 
+    @property
+    def samples(self) -> float:
+        """The shift in samples."""
+        return self.acts_later_s / self.sample_time_s
+
     def says(self) -> str:
         """Return the sentence for the checks of a verdict."""
-        samples = self.acts_later_s / self.sample_time_s
-        return (
-            f"On all axes, torques act {1e3 * self.acts_later_s:.3g} ms ({samples:.2g} samples) later than they are "
-            "logged, as commands do that are held for a sample. They are compared where they act."
-        )
+        size = f"{abs(1e3 * self.acts_later_s):.3g} ms ({abs(self.samples):.2g} samples)"
+        if self.acts_later_s < 0:
+            said = f"torques are logged {size} later than they act, as measured or filtered torques are"
+        else:
+            said = f"torques act {size} later than they are logged, as commands do that are held for a sample"
+        return f"On all axes, {said}. They are compared where they act."
 
 
-def held_commands(robot: Robot, logs: Sequence[Log]) -> HeldCommands | None:
+def torque_clock(robot: Robot, logs: Sequence[Log]) -> TorqueClock | None:
     """Return by how much the torques of a rigid arm act later than logged; None where no such time is seen.
 
     ``logs``: of one sample time. At least two axes must tell, and those that do must agree: on a single axis the
@@ -51,6 +62,26 @@ def held_commands(robot: Robot, logs: Sequence[Log]) -> HeldCommands | None:
     rigid = all(robot.axis_is_rigid) and robot.n_axes > 1
     if not rigid or not all(log.has_torque for log in logs):
         return None
+    step_s = logs[0].sample_time_s
+    found, moved = TorqueClock(0.0, step_s), list(logs)
+    more_s, last_s = _common_shift(robot, moved), np.inf
+    # Friction of the regression takes a part of the shift. Each further estimate adds what the last one left.
+    while more_s is not None and abs(more_s) < last_s:
+        found, last_s = TorqueClock(found.acts_later_s + more_s, step_s), abs(more_s)
+        moved = where_they_act(logs, found)
+        more_s = _common_shift(robot, moved)
+    least, most = (x * step_s for x in _SAMPLES)
+    plausible = least <= found.acts_later_s <= most or -MOST_S <= found.acts_later_s <= -least
+    return found if plausible else None
+
+
+def where_they_act(logs: Sequence[Log], clock: TorqueClock) -> list[Log]:
+    """Return the logs with the torques that act at each sample."""
+    return [replace(log, torque_nm=_delayed(log.torque_nm, clock.samples)) for log in logs]
+
+
+def _common_shift(robot: Robot, logs: Sequence[Log]) -> float | None:
+    """Return the time by which torques act later [s]; None if it is not significant, or if axes disagree."""
     cells = np.array([cell for log in logs for cell in _cells(robot, log)])
     shifts = [_slope(cells[:, axis]) for axis in range(robot.n_axes)]
     own_s, error_s = (np.array(x) for x in zip(*shifts, strict=True))
@@ -58,22 +89,13 @@ def held_commands(robot: Robot, logs: Sequence[Log]) -> HeldCommands | None:
     if not weight.any():
         return None
     later_s = float(weight @ own_s / weight.sum())
-    least_s = SIGNIFICANT / float(np.sqrt(weight.sum()))
-    first_s, last_s = (x * logs[0].sample_time_s for x in _SAMPLES)
-    if not max(least_s, first_s) <= later_s <= last_s:
+    if abs(later_s) < SIGNIFICANT / float(np.sqrt(weight.sum())):
         return None
     # An axis that tells needs half of the significance of all. An effect that the simulator lacks on some axes seems
     # to shift these axes alone.
-    tell = (error_s > 0.0) & (later_s >= 0.5 * SIGNIFICANT * error_s)
-    alike = (own_s > ALIKE[0] * later_s) & (own_s < ALIKE[1] * later_s)
-    agreed = tell.sum() > 1 and alike[tell].all()
-    return HeldCommands(later_s, logs[0].sample_time_s) if agreed else None
-
-
-def where_they_act(logs: Sequence[Log], held: HeldCommands) -> list[Log]:
-    """Return the logs with the torques that act at each sample."""
-    samples = held.acts_later_s / held.sample_time_s
-    return [replace(log, torque_nm=_delayed(log.torque_nm, samples)) for log in logs]
+    tell = (error_s > 0.0) & (abs(later_s) >= 0.5 * SIGNIFICANT * error_s)
+    alike = (own_s / later_s > ALIKE[0]) & (own_s / later_s < ALIKE[1])
+    return later_s if tell.sum() > 1 and alike[tell].all() else None
 
 
 def _delayed(x: Array, samples: float) -> Array:
