@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from axisight.calibration.geometry import errors_about, left_jacobian
 from axisight.calibration.identify import Calibration
@@ -150,7 +150,9 @@ def _rotation_vector(calibration: Calibration, frame: str) -> tuple[Array, Array
     names = [str(name) for name in calibration.table["parameter"].values]
     own = [names.index(f"{frame}.rotation_{x}") for x in "xyz"]
     matrix = getattr(calibration.geometry, f"{frame}_rotation")
-    vector = np.asarray(Rotation.from_matrix(matrix).as_rotvec(), dtype=np.float64)
+    vector = np.asarray(
+        scipy.spatial.transform.Rotation.from_matrix(matrix).as_rotvec(), dtype=np.float64
+    )
     # dR = [J(deviation) d(deviation)]x R = [J(vector) d(vector)]x R.
     deviation = calibration.table["deviation"].values[own]
     slope = np.linalg.solve(left_jacobian(vector), left_jacobian(deviation))

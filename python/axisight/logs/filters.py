@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
-import scipy
 
 from axisight.errors import InputError
 from axisight.logs.log import Floats
+from axisight.statistics.recursion import zero_phase
 
 LOWPASS_ORDER = 4
 """Default order of the low-pass; running it forward and backward doubles the order of the gain."""
@@ -52,38 +51,32 @@ def lowpass(
             f"x: expected more than {least} samples for order {order}, got {x.shape[0]}"
         )
     pad = min(x.shape[0] - 1, max(least, math.ceil(_PADDING_PERIODS / (cutoff_hz * sample_time_s))))
-    # A copy: scipy needs a writable array, and the cached one is read-only.
-    sections = _butterworth(order, cutoff_hz * sample_time_s * 2.0).copy()
+    extended = _reflected(x, pad)
     if curved:
-        extended = _extended(x, pad, max(least, math.ceil(1.0 / (cutoff_hz * sample_time_s))))
-        smooth = scipy.signal.sosfiltfilt(sections, extended, axis=0, padtype=None)
-        return np.asarray(smooth[pad:-pad], dtype=np.float64)
-    return np.asarray(scipy.signal.sosfiltfilt(sections, x, axis=0, padlen=pad), dtype=np.float64)
+        window = max(least, math.ceil(1.0 / (cutoff_hz * sample_time_s)))
+        _add_curvature(extended, x, pad, window)
+    smooth = zero_phase(order, cutoff_hz / nyquist, extended)
+    return np.ascontiguousarray(smooth[pad:-pad])
 
 
-def _extended(x: Floats, pad: int, window: int) -> Floats:
-    """Return a signal padded by its odd reflection at both ends, plus the curvature at each end.
+def _reflected(x: Floats, pad: int) -> Floats:
+    """Return a signal padded by its odd reflection at both ends."""
+    first, last = 2.0 * x[0] - x[pad:0:-1], 2.0 * x[-1] - x[-2 : -pad - 2 : -1]
+    return np.concatenate([first, x, last])
 
-    So the padding continues a parabola exactly. The curvature at an end comes from a cubic fit to ``window``
-    samples.
+
+def _add_curvature(extended: Floats, x: Floats, pad: int, window: int) -> None:
+    """Add the curvature at each end of ``x`` to its padding, which then continues a parabola exactly.
+
+    The curvature at an end comes from a cubic fit to ``window`` samples.
     """
     window = min(window, x.shape[0])
     # Second derivative of the cubic at its first sample, per sample squared.
     powers = np.vander(np.arange(window, dtype=np.float64), 4, increasing=True)
     weights = 2.0 * np.linalg.pinv(powers)[2]
     k = np.arange(1.0, pad + 1.0).reshape(-1, *[1] * (x.ndim - 1))
-    first = 2.0 * x[0] - x[1 : pad + 1] + np.tensordot(weights, x[:window], 1) * k**2
-    back = x[::-1]
-    last = 2.0 * back[0] - back[1 : pad + 1] + np.tensordot(weights, back[:window], 1) * k**2
-    return np.concatenate([first[::-1], x, last])
-
-
-@lru_cache(maxsize=64)
-def _butterworth(order: int, cutoff: float) -> Floats:
-    """Return second-order sections, cached as design takes as long as filtering; `cutoff` over Nyquist."""
-    sections = np.asarray(scipy.signal.butter(order, cutoff, output="sos"), dtype=np.float64)
-    sections.setflags(write=False)
-    return sections
+    extended[:pad] += (np.tensordot(weights, x[:window], 1) * k**2)[::-1]
+    extended[-pad:] += np.tensordot(weights, x[::-1][:window], 1) * k**2
 
 
 def differentiate(

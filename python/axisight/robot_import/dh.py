@@ -6,8 +6,8 @@ import math
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from axisight.arguments import shown
 from axisight.errors import RobotError
@@ -76,4 +76,4 @@ def _number(row: dict[str, str], name: str, where: str) -> float:
 
 
 def _turned(about: str, angle: float) -> Pose:
-    return Pose(Rotation.from_euler(about, angle).as_matrix(), np.zeros(3))
+    return Pose(scipy.spatial.transform.Rotation.from_euler(about, angle).as_matrix(), np.zeros(3))

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from axisight.errors import MissingExtraError, RobotError
 from axisight.robot_import.bodies import (
@@ -252,11 +252,13 @@ class _Compiled:
 
 def _rotation(quaternion: Array) -> Array:
     """Return the rotation (3, 3) of a quaternion (4,) with the real part first."""
-    return np.asarray(Rotation.from_quat(np.roll(quaternion, -1)).as_matrix())
+    return np.asarray(
+        scipy.spatial.transform.Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
+    )
 
 
 def _moved(motion: Motion, axis: Array, by: float) -> Pose:
     """Return the pose after a joint has moved by an angle [rad] or a distance [m]."""
     if motion == "prismatic":
         return Pose(np.eye(3), by * axis)
-    return Pose(Rotation.from_rotvec(by * axis).as_matrix(), np.zeros(3))
+    return Pose(scipy.spatial.transform.Rotation.from_rotvec(by * axis).as_matrix(), np.zeros(3))

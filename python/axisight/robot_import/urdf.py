@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from axisight.arguments import shown
 from axisight.errors import RobotError
@@ -157,7 +157,7 @@ def _pose(origin: Element | None) -> Pose:
         return still()
     roll, pitch, yaw = origin.numbers("rpy", 3, (0.0, 0.0, 0.0))
     position = origin.numbers("xyz", 3, (0.0, 0.0, 0.0))
-    turned = Rotation.from_euler("xyz", [roll, pitch, yaw])
+    turned = scipy.spatial.transform.Rotation.from_euler("xyz", [roll, pitch, yaw])
     return Pose(turned.as_matrix(), np.array(position))
 
 

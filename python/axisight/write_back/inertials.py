@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from axisight.robot_import.xml_tree import Element
 from axisight.write_back.links import BodyChange
@@ -85,7 +85,7 @@ def _urdf(edits: Edits, root: Element, link: Element, change: BodyChange) -> str
             edits.set(origin, place)
     if _differ(change.before.inertia_kg_m2, after.inertia_kg_m2):
         angles = (0.0, 0.0, 0.0) if origin is None else origin.numbers("rpy", 3, (0.0, 0.0, 0.0))
-        turned = Rotation.from_euler("xyz", angles).as_matrix()
+        turned = scipy.spatial.transform.Rotation.from_euler("xyz", angles).as_matrix()
         inside = turned.T @ after.inertia_kg_m2 @ turned
         edits.set(inertias, dict(zip(_NAMES, inside[_ENTRIES].tolist(), strict=True)))
     return ""

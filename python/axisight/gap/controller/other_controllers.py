@@ -25,6 +25,7 @@ from axisight.gap.facts.algebraic_cause import AlgebraicCause
 from axisight.gap.facts.result import Interval
 from axisight.logs import Log, lowpass
 from axisight.robot import Robot
+from axisight.statistics.recursion import recursive
 
 Array = NDArray[np.float64]
 
@@ -108,12 +109,12 @@ def _filtered(speed: Array, lag_s: float, damping: float, time_s: float) -> Arra
     """Return a speed, low-passed so that slow motion lags by ``lag_s`` [s]; of the first order without ``damping``."""
     if not damping or not lag_s:
         keep = lag_s / (lag_s + time_s)
-        return np.asarray(scipy.signal.lfilter([1 - keep], [1, -keep], speed))
+        return recursive([1 - keep], [1, -keep], speed)
     corner = 2 * damping / lag_s
-    poles = [1.0, 2 * damping * corner, corner**2]
-    return np.asarray(
-        scipy.signal.lfilter(*scipy.signal.bilinear(poles[2:], poles, 1 / time_s), speed)
-    )
+    # The bilinear transform, with the corner in half-samples.
+    w = 0.5 * corner * time_s
+    below = [1 + 2 * damping * w + w * w, 2 * (w * w - 1), 1 - 2 * damping * w + w * w]
+    return recursive([w * w, 2 * w * w, w * w], below, speed)
 
 
 def _delayed(x: Array, samples: int) -> Array:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -59,7 +58,7 @@ class Turning:
         used = np.abs(self.speed_rad_s) * order < np.pi * _OF_NYQUIST / self.sample_time_s
         wave = np.cumprod(np.broadcast_to(np.exp(1j * self.angle_rad), used.shape), axis=0) * used
         # Fade in and out, so that the jump from the end of a log to its start adds no wave.
-        wave *= scipy.signal.windows.tukey(len(self.angle_rad), _TAPERED)
+        wave *= _faded(len(self.angle_rad))
         spectra = np.fft.rfft(np.concatenate([wave.real, wave.imag]))
         return np.asarray(spectra * np.exp(2j * np.pi * self.frequency_hz * self.later_s))
 
@@ -182,3 +181,12 @@ def _gains(normal: Array, along: Array, found: Sequence[int]) -> Array:
     solvable = np.where(usable[:, None, None], pairs, np.eye(2))
     solution = np.linalg.solve(solvable, right[:, :, None])[:, :, 0]
     return np.where(usable, np.sum(right * solution, axis=1), 0.0)
+
+
+def _faded(n: int) -> Array:
+    """Return a window (n,) that rises from zero at the start of a log and falls to zero at its end, as a cosine."""
+    edge = 0.5 * _TAPERED * (n - 1)
+    at = np.arange(n)
+    return np.asarray(
+        0.5 - 0.5 * np.cos(np.pi * np.minimum(np.minimum(at, n - 1 - at) / edge, 1.0))
+    )

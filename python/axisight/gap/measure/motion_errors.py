@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
 from axisight.gap.facts.compared_quantity import VelocityFrom
 from axisight.gap.facts.faults import Finding
@@ -90,7 +90,9 @@ def slope(values: Array, time_s: float, lag_s: float = 0.0) -> Array:
     At a fifth of the sample rate it is 2 % too small; a central difference is 25 % too small.
     """
     at = time_s * np.arange(len(values))
-    return np.asarray(make_interp_spline(at, values, k=3)(np.maximum(at - lag_s, 0.0), nu=1))
+    return np.asarray(
+        scipy.interpolate.make_interp_spline(at, values, k=3)(np.maximum(at - lag_s, 0.0), nu=1)
+    )
 
 
 def speeds_at_samples(position_rad: Array, time_s: float, step: int, lag_s: float = 0.0) -> Array:

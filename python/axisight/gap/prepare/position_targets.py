@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
 from axisight.errors import InputError
 from axisight.gap.controller.feedback import feedback, rotors, told_as_torque
@@ -199,7 +199,9 @@ def between(values: Array, step: int) -> Array:
         return values
     n = len(values)
     return np.asarray(
-        make_interp_spline(np.arange(n), values, k=3)(np.arange((n - 1) * step + 1) / step)
+        scipy.interpolate.make_interp_spline(np.arange(n), values, k=3)(
+            np.arange((n - 1) * step + 1) / step
+        )
     )
 
 

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from axisight.gap.prepare.log_start import begins
@@ -17,6 +16,7 @@ from axisight.gap.signals.lowpass_cutoff import rigid_below_hz
 from axisight.logs import Log
 from axisight.robot import Robot
 from axisight.simulation import simulate, white_noise
+from axisight.statistics.recursion import recursive
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ def _holding_nm(robot: Robot, log: Log) -> Array:
 def _solved(given: Array, share: Array) -> Array:
     """Return x (n, n_axes) with ``x + share * (sum of all x before) = given``."""
     columns = [
-        scipy.signal.lfilter([1.0, -1.0], [1.0, float(s) - 1.0], g)
+        recursive([1.0, -1.0], [1.0, float(s) - 1.0], g)
         for s, g in zip(np.broadcast_to(share, given.shape[1:]), given.T, strict=True)
     ]
     return np.ascontiguousarray(np.stack(columns, axis=1))

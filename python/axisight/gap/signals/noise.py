@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from axisight.fitting import Weighting
 from axisight.logs import Log
+from axisight.statistics.spectral_density import welch
 
 Array = NDArray[np.float64]
 
@@ -52,9 +53,7 @@ def white_std(x: Array, sample_time_s: float) -> Array:
     """Return the standard deviation of white noise (n_axes,) on a signal (n, n_axes), as in `position_noise_std`."""
     rate = 1.0 / sample_time_s
     # Second differences remove slow motion, which would leak into the top; white noise stays.
-    f, density = scipy.signal.welch(
-        np.diff(x, n=2, axis=0), rate, nperseg=min(_SEGMENT, len(x) // 2), axis=0
-    )
+    f, density = welch(np.diff(x, n=2, axis=0), rate, min(_SEGMENT, len(x) // 2))
     top = (f > (0.4 if len(x) > _SHORT else 0.3) * rate) & (f < 0.49 * rate)
     gain = (2 * np.sin(np.pi * f[top] / rate)) ** 4
     return np.asarray(np.sqrt(np.mean(density[top] / gain[:, None], axis=0) * rate / 2))
@@ -84,5 +83,5 @@ def smoothed(density: Array, shape: Array) -> Array:
 
 def torque_density(x: Array, rate: float, segment: int) -> tuple[Array, Array]:
     """Return frequencies [Hz] and density (n_axes, n_freq), scaled so that white noise has its variance."""
-    f, density = scipy.signal.welch(x, rate, nperseg=segment, axis=0, detrend="constant")
+    f, density = welch(x, rate, segment)
     return f, np.asarray(density.T * rate / 2)

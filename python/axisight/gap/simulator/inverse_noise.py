@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from axisight.gap.facts.simulator_variant import AS_GIVEN
@@ -17,6 +16,7 @@ from axisight.gap.simulator.rigid_torque import predicted_torque
 from axisight.logs import Log, differentiate, lowpass
 from axisight.robot import Robot
 from axisight.simulation import white_noise
+from axisight.statistics.spectral_density import welch
 
 Array = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ def _top_std(log: Log, x: Array) -> Array:
     that from sample-to-sample differences without the largest ones.
     """
     rate = 1.0 / log.sample_time_s
-    f, density = scipy.signal.welch(x, rate, nperseg=segment_of(log), axis=0)
+    f, density = welch(x, rate, segment_of(log))
     top = (f > 0.4 * rate) & (f < 0.49 * rate)
     found = np.sqrt(np.mean(density[top], axis=0) * rate / 2)
     return np.asarray(np.minimum(found, _unbroken_std(x)))

@@ -1,0 +1,62 @@
+"""Recursive filters: linear difference equations, and low-passes of Butterworth's kind.
+
+A difference equation is a triangular system of equations with a narrow band, which LAPACK solves row by row. So no
+filter of ``scipy.signal`` is needed, which takes longer to load than all filters of a diagnosis take to run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+Array = NDArray[np.float64]
+
+
+def recursive(above: Sequence[float], below: Sequence[float], x: Array) -> Array:
+    """Return ``y`` of the shape of ``x``, (n,) or (n, k), filtered along the first dimension.
+
+    ``below[0] y[t] + below[1] y[t - 1] + ... = above[0] x[t] + above[1] x[t - 1] + ...``; ``x`` and ``y`` are zero
+    before the first sample. ``below[0]`` must not be zero.
+    """
+    moved = above[0] * x
+    for lag, factor in enumerate(above[1:], 1):
+        moved[lag:] += factor * x[:-lag]
+    band = np.repeat(np.asarray(below, dtype=np.float64)[:, None] / below[0], len(x), axis=1)
+    columns = np.asfortranarray(moved.reshape(len(x), -1) / below[0])
+    y, _ = lapack.dtbtrs(band, columns, uplo="L", diag="U", overwrite_b=True)
+    return np.asarray(y, dtype=np.float64).reshape(x.shape)
+
+
+def settled(above: Sequence[float], below: Sequence[float], x: Array) -> Array:
+    """Return the same as `recursive` for a filter of gain one at zero frequency, settled at the first sample."""
+    return np.asarray(recursive(above, below, x - x[0]) + x[0], dtype=np.float64)
+
+
+def butterworth(order: int, cutoff: float) -> list[tuple[list[float], list[float]]]:
+    """Return the sections (above, below) of a low-pass, each of the second order, or of the first if one is left.
+
+    ``cutoff``: frequency of half the power, as a share of the Nyquist frequency, between 0 and 1. The bilinear
+    transform makes the filter discrete, exact at this frequency.
+    """
+    w = float(np.tan(0.5 * np.pi * cutoff))
+    sections = []
+    for k in range(order // 2):
+        # Twice the damping of a pair of poles; they lie evenly on the left half of a circle.
+        damped = 2.0 * float(np.sin((2 * k + 1) * np.pi / (2 * order)))
+        below = [1.0 + damped * w + w * w, 2.0 * (w * w - 1.0), 1.0 - damped * w + w * w]
+        sections.append(([w * w, 2.0 * w * w, w * w], below))
+    if order % 2:
+        sections.append(([w, w], [1.0 + w, w - 1.0]))
+    return sections
+
+
+def zero_phase(order: int, cutoff: float, x: Array) -> Array:
+    """Return a signal (n,) or (n, k) after a Butterworth low-pass forward and backward, settled at both ends."""
+    for _ in range(2):
+        for above, below in butterworth(order, cutoff):
+            x = settled(above, below, x)
+        x = x[::-1]
+    return x
