@@ -28,16 +28,17 @@ class Plant:
         self.loop = loop
         self.joints, self.driven = arm.joints, arm.driven
         self.motors = [arm.joints[i] for i in arm.driven]
-        # Axes whose motor is a body of its own, and those whose motor turns with the joint.
-        self.geared = [i for i, m in enumerate(self.motors) if m.stiffness is not None]
-        self.rigid = [i for i, m in enumerate(self.motors) if m.stiffness is None]
+        self.ratios = arm.ratios.tolist()
+        # Axes whose motor is a body of its own, with its coordinate; the others turn with the joint.
+        elastic = [axis for axis, motor in enumerate(self.motors) if motor.stiffness is not None]
+        self.geared = {axis: len(arm.joints) + i for i, axis in enumerate(elastic)}
         self.springs = [i for i, joint in enumerate(arm.joints) if joint.ratio is None]
         self.skeleton = self._skeleton()
         self.size = self.skeleton.getNumDofs()
         self.reflected = np.zeros((self.size, self.size))
-        for axis in self.rigid:
-            joint, motor = self.driven[axis], self.motors[axis]
-            self.reflected[joint, joint] = motor.motor_inertia / motor.ratio**2
+        for axis, (joint, motor) in enumerate(zip(self.driven, self.motors, strict=True)):
+            if axis not in self.geared:
+                self.reflected[joint, joint] = motor.motor_inertia / motor.ratio**2
 
     def _skeleton(self) -> Skeleton:
         skeleton = Skeleton(self.loop.arm.name)
@@ -53,15 +54,19 @@ class Plant:
         """Return coordinates and rates at the beginning of a log."""
         state = np.zeros(2 * self.size)
         state[: len(self.joints)] = self.loop.angles
-        state[len(self.joints) : self.size] = self.loop.phi[self.geared]
+        for axis, rotor in self.geared.items():
+            state[rotor] = self.loop.phi[axis]
         return state
 
-    def split(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def split(self, state: list[float]) -> tuple[list[float], ...]:
         """Return angles and speeds of the motors, then those of the driven joints."""
-        place, rate = state[: self.size], state[self.size :]
-        q, v = place[self.driven], rate[self.driven]
-        phi, w = q / self.loop.ratios, v / self.loop.ratios
-        phi[self.geared], w[self.geared] = place[len(self.joints) :], rate[len(self.joints) :]
+        size = self.size
+        q = [state[i] for i in self.driven]
+        v = [state[size + i] for i in self.driven]
+        phi = [a / r for a, r in zip(q, self.ratios, strict=True)]
+        w = [a / r for a, r in zip(v, self.ratios, strict=True)]
+        for axis, rotor in self.geared.items():
+            phi[axis], w[axis] = state[rotor], state[size + rotor]
         return phi, w, q, v
 
     def rate(self, t: float, state: np.ndarray) -> np.ndarray:
@@ -69,29 +74,29 @@ class Plant:
         skeleton, rate = self.skeleton, state[self.size :]
         skeleton.setPositions(state[: self.size])
         skeleton.setVelocities(rate)
-        torque = self._torques(t, state) - skeleton.getCoriolisAndGravityForces()
+        torque = self._torques(t, state.tolist()) - skeleton.getCoriolisAndGravityForces()
         inertia = skeleton.getMassMatrix() + self.reflected
         return np.concatenate([rate, np.linalg.solve(inertia, torque)])
 
-    def _torques(self, t: float, state: np.ndarray) -> np.ndarray:
+    def _torques(self, t: float, state: list[float]) -> list[float]:
         """Return the torques of motors, gears, springs and laws on all coordinates [Nm]."""
-        loop = self.loop
+        loop, out = self.loop, [0.0] * self.size
         phi, w, q, v = self.split(state)
         loads = self._gears(phi, w, q, v)
-        motor = loop.held - np.array([m.viscous for m in self.motors]) * w
-        if loop.motor_laws:
-            motor = motor + loop.motor_extra(t, phi.tolist(), w.tolist(), loads)
-        out = np.zeros(self.size)
-        for axis in self.rigid:
-            out[self.driven[axis]] = motor[axis] / loop.ratios[axis]
-        for number, axis in enumerate(self.geared, len(self.joints)):
-            out[self.driven[axis]] = loads[axis]
-            out[number] = motor[axis] - loop.ratios[axis] * loads[axis]
+        extra = loop.motor_extra(t, phi, w, loads)
+        for axis, motor in enumerate(self.motors):
+            torque = float(loop.held[axis]) + extra[axis] - motor.viscous * w[axis]
+            if axis in self.geared:
+                out[self.driven[axis]] = loads[axis]
+                out[self.geared[axis]] = torque - motor.ratio * loads[axis]
+            else:
+                out[self.driven[axis]] = torque / motor.ratio
         for i in self.springs:
             spring = self.joints[i]
             out[i] = -spring.stiffness * state[i] - spring.damping * state[self.size + i]
         if loop.joint_laws:
-            out[self.driven] += loop.joint_extra(t, q.tolist(), v.tolist())
+            for joint, torque in zip(self.driven, loop.joint_extra(t, q, v), strict=True):
+                out[joint] += torque
         return out
 
     def _gears(self, phi, w, q, v) -> list[float]:
@@ -117,7 +122,7 @@ def run(loop: Loop) -> None:
     for step in range(len(loop.w_ref) * SUBSTEPS):
         if not np.isfinite(state).all():
             raise RuntimeError(f"expected a finite state, got {state} in substep {step}")
-        loop.substep(step, *plant.split(state))
+        loop.substep(step, *plant.split(state.tolist()))
         state = _after(plant, step * h, state, h)
 
 
