@@ -1,8 +1,8 @@
 """Arms in DART: a skeleton of the links, beside it a body for each rotor that drives an elastic gear.
 
-DART gives the mass matrix and the Coriolis, centrifugal and gravity torques. Rotors of rigid gears are
-reflected into the mass matrix. Runge-Kutta steps of order four are taken here, one a substep, because
-DART's own integrator is of order one.
+DART gives the accelerations. Where a gear is rigid, it gives the mass matrix and the Coriolis,
+centrifugal and gravity torques, and the rotor is reflected into this matrix. Runge-Kutta steps of order
+four are taken here, one a substep, because DART's own integrator is of order one.
 """
 
 from __future__ import annotations
@@ -35,10 +35,7 @@ class Plant:
         self.springs = [i for i, joint in enumerate(arm.joints) if joint.ratio is None]
         self.skeleton = self._skeleton()
         self.size = self.skeleton.getNumDofs()
-        self.reflected = np.zeros((self.size, self.size))
-        for axis, (joint, motor) in enumerate(zip(self.driven, self.motors, strict=True)):
-            if axis not in self.geared:
-                self.reflected[joint, joint] = motor.motor_inertia / motor.ratio**2
+        self.reflected = None if len(elastic) == len(self.motors) else self._reflected()
 
     def _skeleton(self) -> Skeleton:
         skeleton = Skeleton(self.loop.arm.name)
@@ -49,6 +46,14 @@ class Plant:
         for axis in self.geared:
             _rotor(skeleton, self.motors[axis].motor_inertia)
         return skeleton
+
+    def _reflected(self) -> np.ndarray:
+        """Return what the rotors of rigid gears add to the mass matrix [kg m^2]."""
+        added = np.zeros(self.size)
+        for axis, (joint, motor) in enumerate(zip(self.driven, self.motors, strict=True)):
+            if axis not in self.geared:
+                added[joint] = motor.motor_inertia / motor.ratio**2
+        return np.diag(added)
 
     def start(self) -> np.ndarray:
         """Return coordinates and rates at the beginning of a log."""
@@ -74,9 +79,14 @@ class Plant:
         skeleton, rate = self.skeleton, state[self.size :]
         skeleton.setPositions(state[: self.size])
         skeleton.setVelocities(rate)
-        torque = self._torques(t, state.tolist()) - skeleton.getCoriolisAndGravityForces()
+        torque = self._torques(t, state.tolist())
+        if self.reflected is None:
+            skeleton.setForces(torque)
+            skeleton.computeForwardDynamics()
+            return np.concatenate([rate, skeleton.getAccelerations()])
         inertia = skeleton.getMassMatrix() + self.reflected
-        return np.concatenate([rate, np.linalg.solve(inertia, torque)])
+        net = torque - skeleton.getCoriolisAndGravityForces()
+        return np.concatenate([rate, np.linalg.solve(inertia, net)])
 
     def _torques(self, t: float, state: list[float]) -> list[float]:
         """Return the torques of motors, gears, springs and laws on all coordinates [Nm]."""
