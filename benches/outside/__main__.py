@@ -1,12 +1,13 @@
-"""Make cases of machines that Drake and Exudyn simulate.
+"""Make cases of machines that Drake, Exudyn and DART simulate.
 
-python -m outside make CASES --truth FOLDER [--seed N] [--count N]
-python -m outside nominal FOLDER
-python -m outside laws FOLDER
+python -m outside make CASES --truth FOLDER [--seed N] [--count N] [--engines NAME ...]
+python -m outside nominal FOLDER [--engines NAME ...]
+python -m outside laws FOLDER [--engines NAME ...]
 
 The folder that holds the package ``outside`` must be on the path of modules (PYTHONPATH=benches).
 ``make`` writes a draw. ``nominal`` writes one case for each arm with nothing withheld, no scatter and
-no noise, for ``agree.py``. ``laws`` does so with each effect in turn, beside its truth.
+no noise, for ``agree.py``. ``laws`` does so with each effect in turn, beside its truth. Without
+``--engines`` the arms are those of Drake and Exudyn.
 """
 
 from __future__ import annotations
@@ -20,23 +21,26 @@ import numpy as np
 
 from .draw import SINGLE
 from .make import changed, make, place, runs, write
-from .models import ARMS
+from .models import ARMS, arms_of
 from .motions import plan
 
+ENGINES = ("drake", "exudyn", "dart")
 
-def nominal(folder: Path) -> None:
+
+def nominal(folder: Path, engines: list[str]) -> None:
     """Write a case for each arm whose machine is its simulator."""
-    for name, build in ARMS.items():
-        arm = replace(build(), noise_std_rad=0.0)
+    for name in arms_of(engines):
+        arm = replace(ARMS[name](), noise_std_rad=0.0)
         logs = plan(np.random.default_rng(1), arm)
         write(folder / name, arm, logs, runs(arm, [], [w_ref for _, _, w_ref in logs]))
 
 
-def laws(folder: Path) -> None:
+def laws(folder: Path, engines: list[str]) -> None:
     """Write a case for each effect, of a machine that has it and is its simulator otherwise."""
     labels = {}
+    arms = arms_of(engines)
     for number, (name, kind) in enumerate(SINGLE.items()):
-        arm_name, axes = next(iter(kind.axes.items()))
+        arm_name, axes = next((arm, axes) for arm, axes in kind.axes.items() if arm in arms)
         arm = replace(ARMS[arm_name](), noise_std_rad=0.0)
         rng = np.random.default_rng(number)
         logs = plan(rng, arm)[1:4]
@@ -61,11 +65,13 @@ def main() -> None:
     draw.add_argument("--count", type=int, default=66)
     for name in ("nominal", "laws"):
         commands.add_parser(name).add_argument("folder", type=Path)
+    for command in commands.choices.values():
+        command.add_argument("--engines", nargs="+", choices=ENGINES, default=["drake", "exudyn"])
     given = parser.parse_args()
     if given.command == "make":
-        make(given.cases, given.truth, given.seed, given.count)
+        make(given.cases, given.truth, given.seed, given.count, given.engines)
     else:
-        {"nominal": nominal, "laws": laws}[given.command](given.folder)
+        {"nominal": nominal, "laws": laws}[given.command](given.folder, given.engines)
 
 
 main()

@@ -11,31 +11,61 @@ from . import drives, friction, gears, loads, sensing, strangers
 from .arms import Arm
 from .withheld import Place, Withheld
 
-# How often each arm is taken where an effect may be drawn on several.
+# How often each arm is taken where an effect may be drawn on several of its engine.
 WEIGHTS = {
     "elastic_handler": 0.35,
     "elastic_reacher": 0.2,
     "rigid_six": 0.2,
     "rigid_stacker": 0.25,
+    "elastic_scara": 0.25,
+    "elastic_loader": 0.35,
+    "rigid_desk": 0.25,
+    "rigid_offset": 0.15,
 }
-AXES = {"elastic_handler": 3, "elastic_reacher": 2, "rigid_six": 6, "rigid_stacker": 4}
-ELASTIC, RIGID = ("elastic_handler", "elastic_reacher"), ("rigid_six", "rigid_stacker")
+AXES = {
+    "elastic_handler": 3,
+    "elastic_reacher": 2,
+    "rigid_six": 6,
+    "rigid_stacker": 4,
+    "elastic_scara": 3,
+    "elastic_loader": 3,
+    "rigid_desk": 5,
+    "rigid_offset": 6,
+}
 ALL = {arm: range(n) for arm, n in AXES.items()}
-WITH_GEARS = {arm: ALL[arm] for arm in ELASTIC}
+WITH_GEARS = {arm: axes for arm, axes in ALL.items() if arm.startswith("elastic")}
+WITHOUT_GEARS = {arm: axes for arm, axes in ALL.items() if arm.startswith("rigid")}
 # Axes that carry no weight: what has no unique rest under load is drawn there.
-WEIGHTLESS = {"elastic_handler": (0,), "rigid_six": (0,), "rigid_stacker": (0, 3)}
+WEIGHTLESS = {
+    "elastic_handler": (0,),
+    "rigid_six": (0,),
+    "rigid_stacker": (0, 3),
+    "elastic_scara": (0, 1, 2),
+    "elastic_loader": (0,),
+    "rigid_desk": (0,),
+    "rigid_offset": (0,),
+}
+WEIGHTLESS_GEARS = {arm: axes for arm, axes in WEIGHTLESS.items() if arm in WITH_GEARS}
 WITH_WEIGHT = {
     "elastic_handler": (1, 2),
     "elastic_reacher": (0, 1),
     "rigid_six": (1, 2, 4),
     "rigid_stacker": (1, 2),
+    "elastic_loader": (1, 2),
+    "rigid_desk": (1, 2, 3),
+    "rigid_offset": (1, 2, 3),
 }
-# Links whose mass no other axis and no load on the last link replaces.
+# Links whose mass no other axis and no load on the last link replaces. On the first axis of a
+# horizontal arm a mass is one with an inertia.
 INNER = {
     "elastic_handler": (1,),
     "elastic_reacher": (0,),
     "rigid_six": (1, 2, 3),
     "rigid_stacker": (1, 2),
+    "elastic_scara": (1,),
+    "elastic_loader": (1,),
+    "rigid_desk": (1, 2),
+    "rigid_offset": (1, 2),
 }
 # An inertia about the first axis of a rigid arm is one with its rotor.
 TURNING = {
@@ -43,6 +73,10 @@ TURNING = {
     "elastic_reacher": (0, 1),
     "rigid_six": (1, 2, 3, 5),
     "rigid_stacker": (1, 2),
+    "elastic_scara": (1, 2),
+    "elastic_loader": (1, 2),
+    "rigid_desk": (2, 3),
+    "rigid_offset": (2, 3),
 }
 
 
@@ -78,24 +112,26 @@ SINGLE: dict[str, Kind] = {
         gears.backlash, gears.nonlinear_stiffness, gears.transmission_error, loads.extra_mode,
     ),
     **_kinds(
-        {"elastic_handler": (0,)},
+        WEIGHTLESS_GEARS,
         gears.piecewise_stiffness, gears.lost_motion, gears.gear_hysteresis,
-        loads.base_compliance,
     ),
+    **_kinds({"elastic_handler": (0,), "elastic_loader": (0,)}, loads.base_compliance),
     **_kinds(WEIGHTLESS, drives.torque_deadband),
     **_kinds(WITH_WEIGHT, loads.joint_zero_offset, loads.gravity_compensation),
     **_kinds(INNER, loads.link_mass, loads.link_com),
     **_kinds(TURNING, loads.link_inertia),
-    **_kinds({arm: ALL[arm] for arm in RIGID}, loads.rotor_inertia),
-    **_kinds({"rigid_six": (4,)}, friction.axis_coupling),
+    **_kinds(WITHOUT_GEARS, loads.rotor_inertia),
+    **_kinds({"rigid_six": (4,), "rigid_desk": (3,), "rigid_offset": (4,)}, friction.axis_coupling),
     **_kinds(dict.fromkeys(AXES, (0,)), loads.payload, loads.base_tilt, sensing.clock_drift),
 }  # fmt: skip
 
 STRANGERS: dict[str, Kind] = {
     **_kinds(ALL, strangers.tone, strangers.late_brake, strangers.tight_spot, strangers.leaning,
              strangers.wall, strangers.dropouts),
-    **_kinds({"elastic_handler": (1,), "rigid_six": (1,), "rigid_stacker": (1,)}, strangers.strap),
-    **_kinds({"elastic_handler": (0, 1, 2)}, strangers.cubic_damper),
+    **_kinds(dict.fromkeys(("elastic_handler", "rigid_six", "rigid_stacker", "elastic_loader",
+                            "rigid_desk", "rigid_offset"), (1,)), strangers.strap),
+    **_kinds({arm: ALL[arm] for arm in ("elastic_handler", "elastic_scara", "elastic_loader")},
+             strangers.cubic_damper),
 }  # fmt: skip
 
 # Two of these on two axes make a pair.
@@ -135,9 +171,14 @@ def kind(name: str) -> Kind:
     return SINGLE.get(name) or STRANGERS[name]
 
 
-def arm_and_axes(rng: np.random.Generator, names: tuple[str, ...]) -> tuple[str, list[int]]:
-    """Return the name of an arm that can bear all these effects, and an axis for each, all different."""
-    able = [arm for arm in AXES if all(arm in kind(name).axes for name in names)]
+def arm_and_axes(
+    rng: np.random.Generator, names: tuple[str, ...], arms: tuple[str, ...]
+) -> tuple[str, list[int]]:
+    """Return the name of an arm that can bear all these effects, and an axis for each, all different.
+
+    ``arms`` are those to choose from.
+    """
+    able = [arm for arm in arms if all(arm in kind(name).axes for name in names)]
     weights = np.array([WEIGHTS[arm] for arm in able])
     arm = str(rng.choice(able, p=weights / weights.sum()))
     axes: list[int] = []

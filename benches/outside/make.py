@@ -13,7 +13,7 @@ import pandas as pd
 from .arms import Arm, robot_file
 from .draw import arm_and_axes, kind, plan, scattered
 from .loop import Law, Loop
-from .models import ARMS
+from .models import ARMS, arms_of
 from .motions import plan as motion_plan
 from .withheld import Place, Withheld
 
@@ -130,11 +130,12 @@ def effects_of(
     return found, severity(arm, nominal, whole) if whole else change
 
 
-def make_case(folder: Path, seed: int, number: int, case_kind: str, names: tuple[str, ...]) -> dict:
-    """Write a case; return its truth."""
-    key = [seed, number]
+def make_case(
+    folder: Path, key: list[int], case_kind: str, names: tuple[str, ...], arms: tuple[str, ...]
+) -> dict:
+    """Write a case of one of these arms; return its truth. ``key`` seeds what is drawn."""
     rng = np.random.default_rng(key)
-    name, axes = arm_and_axes(rng, names)
+    name, axes = arm_and_axes(rng, names, arms)
     stated = ARMS[name]()
     machine = scattered(rng, stated)
     logs = motion_plan(rng, stated)
@@ -179,23 +180,23 @@ def write(folder: Path, stated: Arm, logs, found: Runs) -> None:
     (folder / "case.toml").write_text("\n".join(lines) + "\n")
 
 
-def make(cases: Path, truth: Path, seed: int, count: int) -> None:
-    """Write a whole draw; cases that are there already stay.
+def make(cases: Path, truth: Path, seed: int, count: int, engines: list[str]) -> None:
+    """Write a whole draw of the arms of these engines; cases that are there already stay.
 
     A machine that is unstable or does not show its effect is drawn again on another arm or axis.
     """
     truth.mkdir(parents=True, exist_ok=True)
     labels = truth / "labels.json"
     known = json.loads(labels.read_text()) if labels.exists() else {}
+    arms = arms_of(engines)
     for number, (case_kind, names) in enumerate(plan(seed, count)):
         name = f"outside_{seed:04}_{number:03}"
         if name in known:
             continue
         for again in range(10):
             try:
-                known[name] = make_case(
-                    cases / name, seed, number + 100_000 * again, case_kind, names
-                )
+                key = [seed, number + 100_000 * again]
+                known[name] = make_case(cases / name, key, case_kind, names, arms)
             except NoMachineError:
                 continue
             break

@@ -1,4 +1,4 @@
-"""The arms: own parameters of common shapes; two elastic ones for Exudyn, two rigid ones for Drake."""
+"""The arms: own parameters of common shapes; elastic and rigid ones, each for one engine."""
 
 from __future__ import annotations
 
@@ -97,9 +97,107 @@ def rigid_stacker() -> Arm:
     )  # fmt: skip
 
 
+def elastic_scara() -> Arm:
+    """Return a horizontal arm of three vertical axes: no axis carries weight, belts on the quill."""
+    joints = (
+        Joint("inner", (0.0, 0.0, 0.22), "z", _link(6.2, (0.15, 0.01, 0.03), 0.02, 0.07, 0.08),
+              6.5e3, 3.0, 1 / 80, 6e-5, 1.5e-4),
+        Joint("outer", (0.325, 0.0, 0.03), "z", _link(5.1, (0.14, -0.01, 0.06), 0.02, 0.05, 0.055),
+              3.2e3, 1.6, 1 / 50, 4e-5, 1e-4),
+        Joint("quill", (0.275, 0.0, 0.0), "z", _link(2.4, (0.03, 0.015, -0.12), 0.012, 0.012, 0.006),
+              6e2, 0.25, 1 / 30, 1.5e-5, 3e-5),
+    )  # fmt: skip
+    return Arm(
+        "elastic horizontal arm", "dart", 1e-3, joints, "cascade",
+        kp=np.array([0.017, 0.0078, 0.001]), ki=np.array([0.14, 0.062, 0.008]),
+        kv=np.array([10.0, 10.0, 12.0]),
+        noise_std_rad=6e-5, pose_rad=np.array([0.3, 0.6, -0.2]),
+        top_speed_rad_s=np.array([100.0, 100.0, 90.0]),
+    )  # fmt: skip
+
+
+def elastic_loader() -> Arm:
+    """Return a loader of three axes for 100 kg: soft gears, an upper arm that turns about itself."""
+    joints = (
+        Joint("turn", (0.0, 0.0, 0.45), "z", _link(210.0, (0.12, 0.02, 0.25), 14.0, 16.0, 12.0),
+              1.6e6, 700.0, 1 / 180, 3.2e-3, 4e-3),
+        Joint("lift", (0.3, 0.0, 0.35), "y", _link(130.0, (0.02, 0.06, 0.5), 11.0, 11.0, 1.5),
+              2.0e6, 900.0, 1 / 200, 3.4e-3, 4e-3),
+        Joint("neck", (0.0, 0.0, 1.05), "z", None, 2.0e6, 900.0),
+        Joint("reach", (0.0, 0.0, 0.0), "y",
+              _link(140.0, (0.75, -0.05, 0.1), 3.0, 18.0, 18.0, 0.2, -0.4, 0.1),
+              1.1e6, 500.0, 1 / 170, 2.6e-3, 3e-3),
+    )  # fmt: skip
+    return Arm(
+        "elastic loader", "dart", 1e-3, joints, "pi_velocity",
+        kp=np.array([0.4, 0.44, 0.24]), ki=np.array([4.0, 4.4, 2.4]), kv=np.zeros(3),
+        noise_std_rad=5e-5, pose_rad=np.array([0.1, 0.2, 0.15]),
+        top_speed_rad_s=np.array([110.0, 100.0, 110.0]),
+    )  # fmt: skip
+
+
+def rigid_desk() -> Arm:
+    """Return a rigid desktop arm of five axes that weighs 3 kg."""
+    joints = (
+        Joint("pan", (0.0, 0.0, 0.06), "z", _link(0.55, (0.0, 0.003, 0.03), 5e-4, 5e-4, 4e-4),
+              ratio=1 / 50, motor_inertia=8e-6, viscous=3e-5),
+        Joint("shoulder", (0.02, 0.0, 0.07), "y", _link(0.9, (0.005, 0.01, 0.1), 4e-3, 4e-3, 5e-4),
+              ratio=1 / 60, motor_inertia=8e-6, viscous=3e-5),
+        Joint("elbow", (0.0, 0.0, 0.19), "y", _link(0.75, (0.07, -0.008, 0.01), 4e-4, 2.5e-3, 2.5e-3),
+              ratio=1 / 50, motor_inertia=6e-6, viscous=2e-5),
+        Joint("pitch", (0.18, 0.0, 0.01), "y", _link(0.4, (0.03, 0.0, 0.0), 1.5e-4, 2.5e-4, 2.5e-4),
+              ratio=1 / 30, motor_inertia=3e-6, viscous=8e-6),
+        Joint("roll", (0.07, 0.0, 0.0), "x", _link(0.5, (0.05, 0.01, 0.012), 2.5e-4, 4e-4, 4e-4),
+              ratio=1 / 20, motor_inertia=2e-6, viscous=2e-6),
+    )  # fmt: skip
+    return Arm(
+        "rigid desktop arm", "dart", 2e-3, joints, "pi_velocity",
+        kp=np.array([2.4e-3, 2.4e-3, 1.7e-3, 6e-4, 1.5e-4]),
+        ki=np.array([1.4e-2, 1.4e-2, 1e-2, 3.6e-3, 9e-4]), kv=np.zeros(5),
+        noise_std_rad=8e-5, pose_rad=np.array([0.2, 0.3, 0.2, 0.3, 0.4]),
+        top_speed_rad_s=np.array([80.0, 80.0, 80.0, 70.0, 60.0]),
+    )  # fmt: skip
+
+
+def rigid_offset() -> Arm:
+    """Return a rigid arm of six axes that weighs 90 kg; no two axes of its wrist meet in one point."""
+    joints = (
+        Joint("base", (0.0, 0.0, 0.2), "z", _link(18.0, (0.0, -0.03, 0.02), 0.1, 0.09, 0.08),
+              ratio=1 / 120, motor_inertia=4e-4, viscous=1.5e-3),
+        Joint("shoulder", (0.0, 0.18, 0.0), "y", _link(32.0, (0.0, -0.01, 0.33), 2.6, 2.5, 0.16),
+              ratio=1 / 120, motor_inertia=4e-4, viscous=2e-3),
+        Joint("elbow", (0.0, -0.13, 0.71), "y", _link(17.0, (0.02, 0.02, 0.27), 0.7, 0.68, 0.06),
+              ratio=1 / 100, motor_inertia=3e-4, viscous=8e-4),
+        Joint("wrist_1", (0.0, 0.02, 0.58), "y", _link(5.5, (0.0, 0.05, 0.01), 0.02, 0.015, 0.018),
+              ratio=1 / 80, motor_inertia=6e-5, viscous=1.5e-4),
+        Joint("wrist_2", (0.0, 0.13, 0.0), "z", _link(5.0, (0.0, 0.01, 0.05), 0.018, 0.015, 0.012),
+              ratio=1 / 80, motor_inertia=6e-5, viscous=1.2e-4),
+        Joint("wrist_3", (0.0, 0.0, 0.12), "y",
+              _link(9.0, (0.03, 0.09, 0.06), 0.06, 0.05, 0.055, 0.003, -0.002, 0.004),
+              ratio=1 / 70, motor_inertia=5e-5, viscous=1e-4),
+    )  # fmt: skip
+    return Arm(
+        "rigid arm with an offset wrist", "dart", 2e-3, joints, "cascade",
+        kp=np.array([0.125, 0.21, 0.06, 0.006, 0.0042, 0.0034]),
+        ki=np.array([1.0, 1.7, 0.48, 0.048, 0.034, 0.027]),
+        kv=np.array([8.0, 8.0, 8.0, 9.0, 9.0, 9.0]),
+        noise_std_rad=8e-5, pose_rad=np.array([0.2, 0.5, 0.9, 0.3, 0.4, 0.2]),
+        top_speed_rad_s=np.array([80.0, 80.0, 80.0, 80.0, 80.0, 70.0]),
+    )  # fmt: skip
+
+
 ARMS = {
     "elastic_handler": elastic_handler,
     "elastic_reacher": elastic_reacher,
     "rigid_six": rigid_six,
     "rigid_stacker": rigid_stacker,
+    "elastic_scara": elastic_scara,
+    "elastic_loader": elastic_loader,
+    "rigid_desk": rigid_desk,
+    "rigid_offset": rigid_offset,
 }
+
+
+def arms_of(engines: list[str]) -> tuple[str, ...]:
+    """Return the names of the arms of these engines, in order."""
+    return tuple(name for name, build in ARMS.items() if build().engine in engines)
