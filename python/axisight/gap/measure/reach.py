@@ -76,7 +76,7 @@ def reach_of(
         noise = [found.noise * each for each in noises.result()]
 
     def measure(errors: Sequence[Array]) -> Stage:
-        return stage(logs, errors, settings.block_s, measured)
+        return stage(logs, errors, settings.block_s, measured, view.silent)
 
     as_given = view.errors(before, logs)
     given = measure(as_given)

@@ -173,7 +173,7 @@ def _floor(stages: Stages, stepped: NDArray[np.bool_] | None) -> float:
     """Return the mean square of the floor, raised for axes with coarse encoder steps."""
     noise, left = _squares(stages.floor), _squares(stages.after)
     more = np.clip(left - noise, 0.0, _BY_STEPS * noise)
-    return float(np.mean(noise if stepped is None else noise + np.where(stepped, more, 0.0)))
+    return float(np.nanmean(noise if stepped is None else noise + np.where(stepped, more, 0.0)))
 
 
 def _no_fall(
@@ -198,7 +198,7 @@ def _no_fall(
     if share >= 0.5 * settings.explained_share:
         return Withdrawal("part", gap.before, gap.after, gap.floor, causes=causes)
     before, after = _squares(stages.given), _squares(stages.after)
-    log, axis = divmod(int(np.argmax(after - before)), after.shape[1])
+    log, axis = divmod(int(np.nanargmax(after - before)), after.shape[1])
     return _on("fall", stages, (log, axis), before, after, names, causes)
 
 
@@ -221,7 +221,7 @@ def _above_floor(stages: Stages, names: Sequence[str]) -> Withdrawal | None:
     excess = above_floor(stages.refitted, stages)
     if not np.any(excess > 0):
         return None
-    log, axis = divmod(int(np.argmax(excess)), excess.shape[1])
+    log, axis = divmod(int(np.nanargmax(excess)), excess.shape[1])
     return _on("none", stages, (log, axis), left, left, names)
 
 
