@@ -208,6 +208,7 @@ def _concluded(
         removed,
         steps > 0,
         differentiated=view.mode == "inverse_dynamics",
+        refuted=float(np.min(found.noise)),
     )
     measured = [view.measured(log) for log in held_logs]
     conclusion, of_steps = with_coarse_encoders(

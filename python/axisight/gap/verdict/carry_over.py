@@ -50,6 +50,7 @@ def carried_over(
     stepped: NDArray[np.bool_] | None = None,
     *,
     differentiated: bool = False,
+    refuted: float = 1.0,
 ) -> Conclusion:
     """Return the conclusion, or *unknown* with the reason where the validation logs contradict it.
 
@@ -66,13 +67,15 @@ def carried_over(
     - ``removed``: share of the validation residual above noise that the causes remove; None if unknown.
     - ``differentiated``: whether torques are predicted from differentiated positions. Their noise lies in the band
       that is compared, so that no average over the log removes it.
+    - ``refuted``: factor by which the model lowered the noise of the estimation logs [1]. Noise as large as the torque
+      is no less doubtful for that.
     - ``stepped`` (n_axes,): axes whose noise comes from encoder steps; none by default.
     """
     withdrawn = None
     labels = tuple(cause.label for cause in conclusion.causes)
     if gap.refitted > _SEEN and gap.floor > _ABSURD * gap.refitted:
         withdrawn = Withdrawal("noise", gap.before, gap.refitted, gap.floor)
-    elif differentiated and hides_all(gap.floor):
+    elif differentiated and hides_all(gap.floor / refuted):
         withdrawn = Withdrawal("loud", gap.before, gap.refitted, gap.floor)
     elif own is not None:
         # Another motion may show more of what no effect explains, and as much of the causes.
