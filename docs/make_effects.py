@@ -112,6 +112,12 @@ def facts(effect: Mapping[str, Any]) -> list[str]:
     if effect["parts"]:
         parts = " and ".join(f"`{n}`" for n in effect["parts"])
         out.append(f"Imitated by {parts} together.")
+    if effect["inverse_dynamics"] and any(p["name"] == "lead_s" for p in effect["parameters"]):
+        out.append(
+            "By inverse dynamics phi_0'' is the measured acceleration, which has the friction in it. Where the "
+            "friction is at its limit both give the same. Near standstill the measured one gives too little friction: "
+            "there a lead is told from logs in closed loop or from position targets."
+        )
     error = f"{100 * effect['formula']['error']:g} %"
     inverse = "yes" if effect["inverse_dynamics"] else "no"
     out += [

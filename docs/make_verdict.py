@@ -40,10 +40,12 @@ for cause in verdict["causes"]:
 
 - Ignore keys that you do not know: versions add keys and never change them.
 - Version 2 adds the verdict `explained_in_part`. Version 1 called it `explained`. A reader of version 1 can treat
-  it as `explained` and look at `remainder`. Nothing else has changed, and commands that read
-  verdicts read both.
+  it as `explained` and look at `remainder`. An axis whose torque
+  carries nothing has the verdict `not_judged`; version 1 refused such logs. Nothing else has changed, and commands
+  that read verdicts read both.
 - Ratios are plain numbers, not per cent.
-- Numbers that do not exist, such as the gap of a simulation that broke off, are `null`.
+- Numbers that do not exist are `null`, such as the gap of a simulation that broke off, or of an axis that is not
+  judged.
 - `a.b` is the key `b` of the object `a`, `a[]` an element of the list `a`, `a.*` any entry of the object `a`.
 - Words such as *gap*, *floor* and *re-fit* are explained in the [glossary](glossary.md).
 """

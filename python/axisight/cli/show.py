@@ -20,7 +20,7 @@ from axisight.gap.facts.compared_quantity import (
     torque_of,
 )
 from axisight.gap.facts.result import MotionErrors
-from axisight.gap.facts.wording import percent
+from axisight.gap.facts.wording import percent, removed_in_words
 from axisight.gap.intake.user_simulator import said
 from axisight.gap.verdict.headline import in_order
 from axisight.report.account import account
@@ -215,7 +215,7 @@ def _ranking(found: Diagnosis) -> Table:
             escape(c.effect),
             axis,
             f"{c.probability:.3f}",
-            f"{c.score:.3f}",
+            removed_in_words(c.score),
             f"{c.significance:.1f}",
         )
     return table

@@ -117,6 +117,9 @@ LINK_MASS, LINK_COM, LINK_INERTIA, LOAD = "link_mass", "link_com", "link_inertia
 Parameters of the load: mass [kg] and position. The centre of mass shifts in the frame of the link.
 """
 
+OWN_INERTIA = ((LOAD, "mass_kg", "gyration_m2"),)
+"""Bodies that an effect adds: effect, its mass, and the squared radius of gyration, which no fit frees."""
+
 LINK_GEOMETRY, JOINT_ZERO, BASE_TILT = (
     "link_geometry",
     ("joint_zero_offset", "offset_rad"),

@@ -214,7 +214,7 @@ class Session:
     def _gap(self, logs: list[Log], errors: list[Array], measured: list[Array]) -> Array:
         with np.errstate(invalid="ignore"):
             per_log = stage(logs, errors, self.settings.block_s, measured).per_log()
-        return combine(per_log)[1]
+        return combine(per_log)
 
     def _by_band(self, residual: Array, variance: Array, sample_time_s: float) -> Array:
         if not np.isfinite(residual).all():

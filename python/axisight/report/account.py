@@ -18,6 +18,7 @@ from axisight.gap.facts.trace import (
     Trace,
     Work,
 )
+from axisight.gap.facts.wording import LARGEST, percent
 
 # Most rivals of the leader that are reported, beside none and unknown.
 _RIVALS = 3
@@ -81,10 +82,12 @@ def _first(one: Comparison) -> str:
         return f"{head}: nothing to compare."
     best = one.hypotheses[0]
     end = f"taken in: {', '.join(one.taken)}" if one.taken else "nothing taken in"
-    return (
-        f"{head}: first of {count} is {best.hypothesis}, p = {best.probability:.3f}, explains "
-        f"{100 * best.score:.3g} % of the gap there on left-out data; {end}."
+    explains = (
+        "where the axis is at its floor"
+        if best.score > LARGEST
+        else f"explains {percent(best.score)} of the gap there on left-out data"
     )
+    return f"{head}: first of {count} is {best.hypothesis}, p = {best.probability:.3f}, {explains}; {end}."
 
 
 def _rivals(one: Comparison) -> Iterator[str]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.facts.result import Diagnosis, Overlay
+from axisight.gap.facts.wording import removed_in_words
 from axisight.report.curves import path, thin
 from axisight.report.scale import Scale
 from axisight.report.wording import (
@@ -48,7 +49,7 @@ def ranking_bars(diagnosis: Diagnosis) -> list[dict[str, str]]:
             "length": f"{100 * c.probability if np.isfinite(c.probability) else 0.0:.2f}%",
             "probability": probability(c.probability),
             "told": f"{title_of(c)}: probability {probability(c.probability)}, "
-            f"held-out score {percent(c.score)}, "
+            f"held-out score {removed_in_words(c.score)}, "
             f"significance {standard_errors(c.significance)} standard errors, {fit_words(c.status)}",
         }
         for c in ranked(diagnosis)[:TOP]

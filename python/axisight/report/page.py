@@ -22,6 +22,7 @@ from axisight.gap.facts.result import (
     VerdictKind,
     Where,
 )
+from axisight.gap.facts.wording import removed_in_words
 from axisight.gap.verdict.headline import NO_VERDICT, in_order, within_tolerances
 from axisight.report.account import account
 from axisight.report.colors import shade
@@ -307,7 +308,7 @@ def _candidate(candidate: Candidate) -> dict[str, str]:
         "effect": plain_name(candidate.effect),
         "place": place(candidate.axis, candidate.axes),
         "probability": probability(candidate.probability),
-        "score": percent(candidate.score),
+        "score": removed_in_words(candidate.score),
         "significance": standard_errors(candidate.significance),
         "status": fit_words(candidate.status),
     }

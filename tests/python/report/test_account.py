@@ -1,6 +1,7 @@
 """The account of a verdict: what was compared, why rivals lost, what each move did."""
 
 import math
+from dataclasses import replace
 
 from axisight.gap.facts.trace import (
     NONE,
@@ -11,6 +12,7 @@ from axisight.gap.facts.trace import (
     Step,
     Trace,
 )
+from axisight.gap.facts.wording import removed_in_words
 from axisight.report.account import account
 
 PLAY, STIFF = "backlash@1", "piecewise_stiffness@1"
@@ -75,3 +77,13 @@ def test_a_cause_that_shares_its_probability_says_with_what():
 
 def test_an_empty_trace_has_an_empty_account():
     assert list(account(Trace()).lines()) == []
+
+
+def test_an_axis_without_a_gap_has_no_share_of_it():
+    """Next to nothing above noise makes any share of it a huge number."""
+    whole = comparison(taken=())
+    first = replace(whole.hypotheses[0], score=3.1e11)
+    ((told, _),) = account(Trace((replace(whole, hypotheses=(first,)),))).comparisons
+    assert "first of 1 is backlash@1, p = 0.950, where the axis is at its floor" in told
+    assert removed_in_words(3.1e11) == "at its floor"
+    assert removed_in_words(0.985) == "98.5 %"

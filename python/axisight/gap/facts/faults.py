@@ -35,6 +35,7 @@ MEANINGS: dict[str, str] = {
     "position_wrapped": "whole turns are cut off a position",
     "position_clipped": "a position is cut at its extreme",
     "channel_constant": "a channel never changes",
+    "channel_dead": "a torque follows no motion and is smaller than its noise",
     "torque_saturated": "a torque is cut at a limit",
     "quantized_position": "a position has steps coarser than the noise that the robot file states",
     "quantized_torque": "a torque has few distinct values",

@@ -28,6 +28,7 @@ from axisight.robot.axis_names import axis_number
 from axisight.storage import write_whole
 
 VerdictKind = Literal["none", "explained", "explained_in_part", "unknown", "undecidable"]
+AxisVerdictKind = Literal[VerdictKind, "not_judged"]
 Mode = Literal["closed_loop", "inverse_dynamics"]
 Hidden = Literal["tolerances", "motion"]
 Array = NDArray[np.float64]
@@ -238,13 +239,13 @@ class Cause:
 class AxisVerdict:
     """Verdict of one axis (from 1); `axisight.gap.verdict.axis_verdicts` has the rule.
 
-    ``excess``: mean square of the residual of the re-fitted simulator above the floor on the estimation logs,
-    in units of noise plus model error. ``explained``: share of it that the causes remove.
-    ``causes``: places of the causes that act on the axis. A cause of the whole arm acts on axes with a gap.
+    ``excess``: mean square of the residual of the re-fitted simulator above the floor on the estimation logs, in units
+    of noise plus model error. ``explained``: share of it that the causes remove. ``causes``: places of those that act
+    here; one of the whole arm acts on axes with a gap. Where a torque carries nothing (*not judged*) the gap is NaN.
     """
 
     axis: int
-    verdict: VerdictKind
+    verdict: AxisVerdictKind
     excess: float
     explained: float
     causes: tuple[int, ...]
@@ -408,10 +409,7 @@ class Diagnosis:
         raise InputError(f"axis: expected an axis with a verdict of its own, got {number}")
 
     def axis_rows(self) -> list[tuple[int, str, tuple[float, ...]]]:
-        """Return of each axis its number (from 1), verdict in words, and gap: before, re-fitted, after, floor [1].
-
-        The verdict is empty where the logs did not get that far. `verdict_word` has the words.
-        """
+        """Return of each axis number (from 1), verdict in words (empty without one), and gap as in `Gap.stages` [1]."""
         gap, verdicts = self.gap, {a.axis: a.verdict for a in self.axes}
         stages = (
             gap.before_per_axis,

@@ -31,7 +31,6 @@ def relative_squares(log: Log, error: Array) -> Array:
     return np.asarray(error**2 / np.maximum(variance, 1e-300))
 
 
-def combine(per_log: Sequence[Array]) -> tuple[float, Array]:
-    """Return the headline gap and the gap per axis from mean squares (n_axes,) of each log."""
-    squares = np.array(per_log)
-    return float(np.sqrt(squares.mean())), np.sqrt(squares.mean(axis=0))
+def combine(per_log: Sequence[Array]) -> Array:
+    """Return the gap per axis (n_axes,) from mean squares (n_axes,) of each log."""
+    return np.asarray(np.sqrt(np.mean(per_log, axis=0)))

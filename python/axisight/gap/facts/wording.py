@@ -19,3 +19,11 @@ def percent(x: float) -> str:
     if not math.isfinite(x):
         return "no share"
     return f"{100 * x:.3g} %" if x <= LARGEST else f"more than {100 * LARGEST:,.0f} %"
+
+
+def removed_in_words(share: float) -> str:
+    """Return which share of the loss above noise a candidate removes [1], in per cent.
+
+    "at its floor" above `LARGEST`: there the axis had next to nothing above noise, so that a share says nothing.
+    """
+    return "at its floor" if share > LARGEST else percent(share)

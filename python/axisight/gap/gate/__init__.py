@@ -8,6 +8,7 @@ from axisight.gap.gate.inspect import (
     pass_gate,
     pass_gate_by_targets,
 )
+from axisight.gap.gate.silent_torques import silent_axes
 
 __all__ = [
     "MEANINGS",
@@ -18,4 +19,5 @@ __all__ = [
     "check_inputs",
     "pass_gate",
     "pass_gate_by_targets",
+    "silent_axes",
 ]

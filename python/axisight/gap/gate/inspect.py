@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from axisight.fitting.simulation_error import is_closed_loop
@@ -18,6 +18,7 @@ from axisight.gap.gate.copies import check_copies
 from axisight.gap.gate.log_only import check_log_alone
 from axisight.gap.gate.machine import check_machine
 from axisight.gap.gate.noise_level import check_noise
+from axisight.gap.gate.silent_torques import set_aside, silent_axes, without_silent
 from axisight.gap.gate.start import check_start
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -87,17 +88,21 @@ def check_inputs(
     - logs against the simulator: by the controller's law in closed loop, else by inverse dynamics;
     - the start and the noise of the logs.
 
-    Logs that the second stage refuses are left out of the later ones, so that all faults of a data set show in one
-    run. Any other refusal ends the checks, since later stages rest on it. ``despite``: names of faults that are only
-    flagged. Raises InputError for a name that is no fault, or for a fault that rules out any diagnosis.
+    Axes whose torque carries nothing are set aside: later stages do not look at them. Logs that the second stage
+    refuses are left out of the later ones, so that all faults of a data set show in one run. Any other refusal ends
+    the checks, since later stages rest on it. ``despite``: names of faults that are only flagged. Raises InputError
+    for a name that is no fault, or for a fault that rules out any diagnosis.
     """
     check_names(despite)
     found = flagged(_machine(robot, estimation, validation), despite)
     if refused(found):
         return tuple(found)
-    found += flagged(_logs(robot, estimation, validation), despite)
-    spoiled = {f.log for f in found if f.severity == "refuse"}
-    sound, held = ([x for x in logs if x.name not in spoiled] for logs in (estimation, validation))
+    alone = _logs(robot, estimation, validation)
+    others = _refused_logs(f for f in alone if f.name != "channel_constant")
+    silent = silent_axes(robot, _but([*estimation, *validation], others))
+    found += flagged(set_aside(alone, silent), despite)
+    spoiled = _refused_logs(found)
+    sound, held = (without_silent(_but(x, spoiled), silent) for x in (estimation, validation))
     for stage in (_against_simulator, _start_and_noise):
         later = flagged(stage(robot, sound, held), despite) if sound or held else []
         found += later
@@ -107,6 +112,15 @@ def check_inputs(
 
 
 _Logs = Sequence[Log]
+
+
+def _refused_logs(findings: Iterable[Finding]) -> set[str | None]:
+    """Return the names of the logs with a refusal of their own."""
+    return {f.log for f in findings if f.severity == "refuse"}
+
+
+def _but(logs: _Logs, names: Collection[str | None]) -> list[Log]:
+    return [log for log in logs if log.name not in names]
 
 
 def _machine(robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding]:

@@ -13,7 +13,7 @@ from axisight.gap.facts.faults import Finding
 from axisight.gap.facts.result import Interval, Reproduction
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.fitted_model import FittedModel
-from axisight.gap.gate import pass_gate, pass_gate_by_targets
+from axisight.gap.gate import pass_gate, pass_gate_by_targets, silent_axes
 from axisight.gap.intake import user_simulator
 from axisight.gap.intake.start_of_logs import from_rest, loops_of
 from axisight.gap.measure.gear_deflections import gears_seen, gears_that_differ
@@ -47,6 +47,7 @@ class PreparedLogs:
     - ``beside``: logs of the user's own simulator, cut like the measured ones.
     - ``in_mujoco``: whether these are runs in MuJoCo that the diagnosis made itself.
     - ``clock``: by how much torques act later than they were logged, where that was corrected.
+    - ``silent``: axes (from 0) whose torque carries nothing; they are not judged.
     """
 
     robot: Robot
@@ -60,10 +61,13 @@ class PreparedLogs:
     beside: tuple[Log, ...] = ()
     clock: TorqueClock | None = None
     in_mujoco: bool = False
+    silent: tuple[int, ...] = ()
 
     def view(self, settings: Settings) -> View:
         """Return the comparison of simulator and logs."""
-        return view_of(self.robot, self.estimation, self.validation, settings, self.commanded)
+        return view_of(
+            self.robot, self.estimation, self.validation, settings, self.commanded, self.silent
+        )
 
     def compared(self, settings: Settings) -> tuple[PreparedLogs, View]:
         """Return the prepared logs and their comparison.
@@ -173,6 +177,7 @@ def behind_gate(
     robot = as_speed_loop(robot, logs)
     found, beside = (*slowed, *begun.findings), begun.simulated
     commanded = with_commands(robot, logs)
+    silent: tuple[int, ...] = ()
     if commanded is not None:
         logged = commanded.as_logged()
         noted = pass_gate_by_targets(commanded.robot, logged[:n], logged[n:], despite)
@@ -181,7 +186,11 @@ def behind_gate(
     else:
         logs = at_their_poses(robot, logs)
         noted = pass_gate(robot, logs[:n], logs[n:], despite)
-    recovered = with_references(robot, logs)
+        silent = silent_axes(robot, logs)
+    if silent:
+        # Closed loop needs the torques of all axes.
+        logs = [replace(log, velocity_ref_rad_s=None) for log in logs]
+    recovered = None if silent else with_references(robot, logs)
     logs = logs if recovered is None else recovered
     noted = (*found, *noted, *gears_that_differ(robot, logs))
     # Logs of the user's own simulator may hold their commands, too: the difference of both is compared.
@@ -203,4 +212,5 @@ def behind_gate(
         beside=tuple(beside),
         clock=clock,
         in_mujoco=bool(in_mujoco),
+        silent=silent,
     )

@@ -88,11 +88,11 @@ def _apart(
         max((m.blocks[k] for m in moved), key=lambda x: float(x.mean()))
         for k in range(len(noise.blocks))
     )
-    apart = Stage(furthest, max(m.pooled for m in moved))
+    apart = Stage(furthest, max(m.pooled for m in moved), noise.silent)
     if not apart.mean() > settings.model_error**2:
         return noise
     blocks = tuple(a + b for a, b in zip(noise.blocks, apart.blocks, strict=True))
-    return Stage(blocks, float(np.hypot(noise.pooled, apart.pooled)))
+    return Stage(blocks, float(np.hypot(noise.pooled, apart.pooled)), noise.silent)
 
 
 def _scattered(variant: Variant, share: float, seed: Sequence[int]) -> Variant:

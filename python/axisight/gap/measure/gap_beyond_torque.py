@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +25,16 @@ _CONSTANT = 0.01
 _CUT = 0.05
 
 
-def beyond_torque(gap: Gap, logs: Sequence[Log]) -> tuple[Finding, ...]:
-    """Return a finding for every axis whose simulator is off by more than ten times the torque, or broke off."""
+def beyond_torque(
+    gap: Gap, logs: Sequence[Log], silent: Collection[int] = ()
+) -> tuple[Finding, ...]:
+    """Return a finding for every axis whose simulator is off by more than ten times the torque, or broke off.
+
+    ``silent``: axes (from 0) that are not judged.
+    """
     off = gap.before_per_axis
-    axes = np.flatnonzero(~(off <= LARGEST))
-    return tuple(_finding(int(axis), float(off[axis]), logs, gap.compared) for axis in axes)
+    axes = [axis for axis in np.flatnonzero(~(off <= LARGEST)).tolist() if axis not in silent]
+    return tuple(_finding(axis, float(off[axis]), logs, gap.compared) for axis in axes)
 
 
 def _finding(axis: int, off: float, logs: Sequence[Log], compared: Compared) -> Finding:

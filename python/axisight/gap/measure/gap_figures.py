@@ -21,19 +21,29 @@ Array = NDArray[np.float64]
 class Stage:
     """Squared relative errors of one simulator, as block means (n_blocks, n_axes) of each log.
 
-    ``pooled``: sqrt(sum e^2 / sum u^2) over all samples, axes and logs, as in `Pooled` [1].
+    ``pooled``: sqrt(sum e^2 / sum u^2) over all samples, axes and logs, as in `Pooled` [1]. ``silent``: axes (from 0)
+    that are not judged; they are NaN.
     """
 
     blocks: tuple[Array, ...]
     pooled: float
+    silent: tuple[int, ...] = ()
 
     def per_log(self) -> list[Array]:
         """Return the mean square (n_axes,) of each log."""
         return [b.mean(axis=0) for b in self.blocks]
 
+    def judged(self) -> list[Array]:
+        """Return the block means (n_blocks, n_judged) of each log on the axes that are judged."""
+        return [np.delete(b, self.silent, axis=1) for b in self.blocks]
+
+    def by_log(self) -> Array:
+        """Return the mean square of each log on the axes that are judged, (n_logs,)."""
+        return np.array([b.mean() for b in self.judged()])
+
     def mean(self) -> float:
-        """Return the mean square over logs and axes."""
-        return float(np.mean(self.per_log()))
+        """Return the mean square over logs and judged axes."""
+        return float(self.by_log().mean())
 
     def resampled(self, picks: Sequence[NDArray[np.int64]]) -> Array:
         """Return the mean square of resampled blocks (n_draws,).
@@ -42,7 +52,7 @@ class Stage:
         """
         return np.asarray(
             np.mean(
-                [b.mean(axis=1)[p].mean(axis=1) for b, p in zip(self.blocks, picks, strict=True)],
+                [b.mean(axis=1)[p].mean(axis=1) for b, p in zip(self.judged(), picks, strict=True)],
                 axis=0,
             )
         )
@@ -53,21 +63,27 @@ def stage(
     errors: Sequence[Array],
     block_s: float,
     measured: Sequence[Array] | None = None,
+    silent: tuple[int, ...] = (),
 ) -> Stage:
     """Return the stage of a simulator from its torque errors (n, n_axes) [Nm] on each log.
 
-    ``measured``: torques (n, n_axes) [Nm] that the errors refer to, by default those of the logs.
+    ``measured``: torques (n, n_axes) [Nm] that the errors refer to, by default those of the logs. ``silent``: axes
+    (from 0) that are not judged.
     """
     blocks = []
     torques = [log.torque_nm for log in logs] if measured is None else measured
     for log, error in zip(logs, errors, strict=True):
         squares = relative_squares(log, error)
+        squares[:, list(silent)] = np.nan
         length = max(1, int(block_s / log.sample_time_s))
         count = max(1, len(squares) // length)
         parts = np.array_split(squares, count)
         blocks.append(np.array([p.mean(axis=0) for p in parts]))
-    torque, left = (sum(float(np.sum(x**2)) for x in of) for of in (torques, errors))
-    return Stage(tuple(blocks), float(np.sqrt(left / max(torque, 1e-300))))
+    torque, left = (
+        sum(float(np.sum(np.delete(x, silent, axis=1) ** 2)) for x in of)
+        for of in (torques, errors)
+    )
+    return Stage(tuple(blocks), float(np.sqrt(left / max(torque, 1e-300))), silent)
 
 
 @dataclass(frozen=True)
@@ -93,7 +109,7 @@ def gap_figures(stages: Stages, *, one_unit: bool = True) -> Gap:
     """
     every = (stages.given, stages.refitted, stages.after, stages.floor)
     (before, before_axes), (refit, refit_axes), (left, left_axes), (noise, noise_axes) = (
-        combine(s.per_log()) for s in every
+        (float(np.sqrt(s.mean())), combine(s.per_log())) for s in every
     )
     pooled = Pooled(*(s.pooled for s in every)) if one_unit else None
     return Gap(

@@ -120,4 +120,4 @@ def speeds_at_samples(position_rad: Array, time_s: float, step: int, lag_s: floa
 
 def _rms(errors: Sequence[Array]) -> Array:
     """Return the rms by axis (n_axes,) over time and logs."""
-    return combine([np.mean(error**2, axis=0) for error in errors])[1]
+    return combine([np.mean(error**2, axis=0) for error in errors])

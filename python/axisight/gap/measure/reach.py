@@ -30,6 +30,7 @@ def refitted_errors(view: View, found: SearchState) -> list[ErrorLog]:
         refit = view.torques(Variant(found.baseline.robot_values), view.logs)
         noises = noise.result()
     errors = view.errors(refit, view.logs)
+    noises = [found.noise * each for each in noises]
     return [ErrorLog(*each) for each in zip(view.logs, errors, noises, strict=True)]
 
 
@@ -72,10 +73,10 @@ def reach_of(
         noises = pool.submit(view.noises, logs, len(view.logs))
         left_open = view.left_open(logs)
         before, *steps = pool.map(lambda v: view.torques(v, logs), simulators)
-        noise = noises.result()
+        noise = [found.noise * each for each in noises.result()]
 
     def measure(errors: Sequence[Array]) -> Stage:
-        return stage(logs, errors, settings.block_s, measured)
+        return stage(logs, errors, settings.block_s, measured, view.silent)
 
     as_given = view.errors(before, logs)
     given = measure(as_given)

@@ -68,6 +68,7 @@ def search(
         causes = tuple(f.effect.label for f in out.model.free)
         out.stopped = Stop(limit.limit_s, out.number, limited.work.stage, causes)
         out.rounds = out.rounds or [Round((), (), out.left())]
+    out.refute_floor()
     fitter.work.stage = "measuring"
     return out
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect, effect_info
+from axisight.gap.facts.axis_names import at_floor
 from axisight.gap.facts.settings import Settings
 from axisight.gap.facts.trace import Step, Stop
 from axisight.gap.fit.data_blocks import Layout
@@ -47,6 +48,7 @@ class SearchState:
     - ``steps``: what each move changed.
     - ``number``: the round that is under way, from 1.
     - ``stopped``: where the time limit ended the search; None if it ended by itself.
+    - ``noise`` (n_axes,): factor on the estimated noise [1]; below one where `refute_floor` lowered the floor.
     - ``adds_up``: whether the errors of the axes add up; ``by_axis``: whether causes explain single axes, not the arm.
     """
 
@@ -62,12 +64,26 @@ class SearchState:
     stopped: Stop | None = None
     adds_up: bool = False
     by_axis: bool = False
+    noise: Array = field(default_factory=lambda: np.ones(1))
 
     @property
     def accepted(self) -> list[tuple[RankedHypothesis, AxisPosterior]]:
         """The causes in the model, each with its latest posterior, in the model's order."""
         entered = {r.trial.label: (r, s) for x in self.rounds for r, s in x.accepted}
         return [entered[f.effect.label] for f in self.model.free]
+
+    def refute_floor(self) -> None:
+        """Lower the floor of the axes where the model leaves less than it on data left out of the fit.
+
+        No model predicts noise, so what it leaves there is the larger of the two.
+        """
+        least = self.layout.by_axis(self.floor)
+        left = self.layout.by_axis(held_out_loss(self.model))
+        share = np.maximum(left, 0.0) / np.maximum(least, 1e-300)
+        stands = [at_floor(f, x) for f, x in zip(np.sqrt(least), np.sqrt(left), strict=True)]
+        share[stands] = 1.0
+        self.floor = self.floor * share[self.layout.axis]
+        self.noise = self.noise * np.sqrt(share)
 
     def moved(self, move: str, model: FittedModel) -> None:
         """Take the model that a move of `axisight.gap.facts.trace.MOVES` makes, and record what it changed."""

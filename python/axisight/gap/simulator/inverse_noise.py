@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from axisight.gap.facts.simulator_variant import AS_GIVEN
 from axisight.gap.signals.motion import Filtering
-from axisight.gap.signals.noise import position_noise_std, segment_of
+from axisight.gap.signals.noise import position_noise_std
+from axisight.gap.signals.noise_colour import noise_colour
 from axisight.gap.signals.repeated_motions import repeated_std_nm
 from axisight.gap.simulator.rigid_torque import predicted_torque
 from axisight.logs import Log, differentiate, lowpass
 from axisight.robot import Robot
 from axisight.simulation import white_noise
-from axisight.statistics.spectral_density import welch
 
 Array = NDArray[np.float64]
 
@@ -59,13 +59,16 @@ class InverseNoise:
         _, acceleration = differentiate(white * self.position_std_rad, step, cutoff, curved=True)
         axes = np.flatnonzero(self.filtering.measured)
         if axes.size and log.velocity_rad_s is not None:
-            speed = lowpass(
-                (white * _top_std(log, log.velocity_rad_s))[:, axes], step, cutoff, curved=True
-            )
+            noise = self._drawn(log, log.velocity_rad_s, 2 * run)
+            speed = lowpass(noise[:, axes], step, cutoff, curved=True)
             acceleration[:, axes] = np.gradient(speed, step, axis=0)
-        torque = white_noise(self.seed, 2 * run + 1, log.n_samples, log.n_axes)
-        left = self._inertial(log, acceleration) - torque * _top_std(log, log.torque_nm)
+        left = self._inertial(log, acceleration) - self._drawn(log, log.torque_nm, 2 * run + 1)
         return np.asarray(self.scale * self.filtering.compared(left, step))
+
+    def _drawn(self, log: Log, x: Array, run: int) -> Array:
+        """Return noise (n, n_axes) as on a signal of a log."""
+        unit = white_noise(self.seed, run, 2 * log.n_samples, log.n_axes)
+        return noise_colour(log, x, self.filtering.cutoff_hz).drawn(unit)
 
     def _inertial(self, log: Log, acceleration: Array) -> Array:
         """Return the torque (n, n_axes) [Nm] of an acceleration added to that of a log: the mass matrix times it."""
@@ -75,29 +78,3 @@ class InverseNoise:
             for a in (own + acceleration, own)
         )
         return with_it - without
-
-
-def _top_std(log: Log, x: Array) -> Array:
-    """Return the standard deviation of white noise (n_axes,) from the top fifth of the spectrum.
-
-    Dry friction breaks a torque at every reversal, which adds power there. The estimate is therefore limited to
-    that from sample-to-sample differences without the largest ones.
-    """
-    rate = 1.0 / log.sample_time_s
-    f, density = welch(x, rate, segment_of(log))
-    top = (f > 0.4 * rate) & (f < 0.49 * rate)
-    found = np.sqrt(np.mean(density[top], axis=0) * rate / 2)
-    return np.asarray(np.minimum(found, _unbroken_std(x)))
-
-
-# Share of the smallest squared differences that is averaged; the rest may contain breaks.
-_KEPT = 0.9
-# Mean square of the smallest 90 % of standard normal numbers, and of third differences of unit white noise.
-_VARIANCE_KEPT, _THIRD = 0.6230, 20.0
-
-
-def _unbroken_std(x: Array) -> Array:
-    """Return the standard deviation of white noise (n_axes,) from the smaller third differences of a signal."""
-    squares = np.sort(np.diff(x, 3, axis=0) ** 2, axis=0)
-    kept = squares[: max(1, int(_KEPT * len(squares)))].mean(axis=0)
-    return np.asarray(np.sqrt(kept / (_VARIANCE_KEPT * _THIRD)))

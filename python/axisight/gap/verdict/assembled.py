@@ -9,6 +9,7 @@ from importlib.metadata import version
 import numpy as np
 import xarray as xr
 
+from axisight.effects import Effect
 from axisight.gap.facts.faults import Finding
 from axisight.gap.facts.result import (
     Cause,
@@ -38,6 +39,7 @@ from axisight.gap.measure.where import (
 from axisight.gap.ranking.twins import open_twins
 from axisight.gap.search.account import trace_of
 from axisight.gap.signals.encoder_steps import encoder_steps
+from axisight.gap.simulator.brought_inertia import brought_inertias
 from axisight.gap.simulator.own_parameters import nominal_and_size, nominal_values
 from axisight.gap.verdict.agreed_probabilities import in_agreement
 from axisight.gap.verdict.axis_verdicts import open_groups, verdict_told, with_axes_agreed
@@ -79,7 +81,7 @@ def assembled(
     conclusion = with_axes_agreed(
         conclusion, reach.judged, gap, settings, own_residual=found.adds_up
     )
-    quiet = [a.axis for a in conclusion.axes if a.verdict == "none"]
+    quiet = [a.axis for a in conclusion.axes if a.verdict in ("none", "not_judged")]
     # A re-fit without a cause may bend the simulator until the rest follows nothing.
     before = () if reach.reductions else reach.given
     left = remainder_of(
@@ -139,9 +141,11 @@ def assembled(
         findings=(
             *noted,
             *refit_worse(reach.stages, names),
-            *beyond_torque(gap, held_logs),
+            *beyond_torque(gap, held_logs, view.silent),
             *reversals_smeared(left, places, view.cutoff_hz),
-            *parameters_at_edge(fitted, nominal, tolerances),
+            *parameters_at_edge(
+                fitted, nominal, tolerances, brought_inertias(robot, _named(conclusion))
+            ),
         ),
         settings=settings.as_dict(robot),
         trace=replace(
@@ -152,6 +156,19 @@ def assembled(
         ),
         provenance=_provenance(robot, view, names, settings),
     )
+
+
+def _named(conclusion: Conclusion) -> list[Effect]:
+    """Return the causes that are named, with their values."""
+    return [
+        Effect(
+            c.effect,
+            None if c.axes else c.axis,
+            {k: p.value for k, p in c.parameters.items()},
+            c.axes,
+        )
+        for c in conclusion.causes
+    ]
 
 
 def _apart(reach: Reach) -> float | None:
@@ -165,9 +182,10 @@ def _next_experiment(conclusion: Conclusion) -> str | None:
 
 
 def _limits(limits: Sequence[DetectionLimit], conclusion: Conclusion) -> tuple[DetectionLimit, ...]:
-    """Return the limits on axes without an unknown gap: what is unknown may hide any effect."""
+    """Return the limits on judged axes without an unknown gap: what is unknown may hide any effect."""
     unknown = {a.axis for a in conclusion.axes if a.verdict == "unknown"}
-    return tuple(x for x in limits if not (unknown if x.axis is None else x.axis in unknown))
+    hidden = unknown | {a.axis for a in conclusion.axes if a.verdict == "not_judged"}
+    return tuple(x for x in limits if not (unknown if x.axis is None else x.axis in hidden))
 
 
 def _concluded(
@@ -190,6 +208,7 @@ def _concluded(
         removed,
         steps > 0,
         differentiated=view.mode == "inverse_dynamics",
+        refuted=float(np.min(found.noise)),
     )
     measured = [view.measured(log) for log in held_logs]
     conclusion, of_steps = with_coarse_encoders(
@@ -198,7 +217,7 @@ def _concluded(
         view,
         held_logs,
         reach.judged,
-        lambda errors: stage(held_logs, errors, settings.block_s, measured),
+        lambda errors: stage(held_logs, errors, settings.block_s, measured, view.silent),
     )
     conclusion, unfelt = with_controllers_shown(conclusion, view)
     return conclusion, [*reach.reductions, *of_steps, *unfelt]
@@ -218,7 +237,9 @@ def _places(
     bands, regimes, significance = maps
     unknown = conclusion.verdict == "unknown"
     told = [
-        a for a in conclusion.axes if a.verdict == "unknown" or not (unknown or a.verdict == "none")
+        a
+        for a in conclusion.axes
+        if a.verdict == "unknown" or not (unknown or a.verdict in ("none", "not_judged"))
     ]
     axes = [a.axis for a in told]
     seen = of_axes(bands, axes)

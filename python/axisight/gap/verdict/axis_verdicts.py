@@ -16,6 +16,8 @@ By inverse dynamics, an axis of such an arm is *unknown* where no cause acts and
 added in squares. The arm is *explained in part* where an axis of an *explained* arm is, or is *unknown*. At least one
 axis has the verdict of the arm, or of its part. An axis that is *none* has no cause, and no place where the gap lies.
 
+An axis whose torque carries nothing is *not judged*, whatever the arm is.
+
 An axis has a gap where one of these holds:
 
 | evidence | limit |
@@ -37,7 +39,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from axisight.gap.facts.axis_names import at_floor
-from axisight.gap.facts.result import AxisVerdict, Gap, VerdictKind
+from axisight.gap.facts.result import AxisVerdict, AxisVerdictKind, Gap, VerdictKind
 from axisight.gap.facts.settings import Settings
 from axisight.gap.measure.gap_figures import Stages
 from axisight.gap.ranking.twins import open_twins
@@ -51,7 +53,7 @@ class AxisEvidence:
 
     ``excess`` and ``explained`` as in `AxisVerdict`; ``refitted``, ``after`` and ``floor`` as in `Gap`;
     ``above``: whether a validation log stands above what passes for the floor; ``left``: whether the causes leave
-    a gap of at least twice the floor.
+    a gap of at least twice the floor; ``silent``: whether its torque carries nothing.
     """
 
     excess: float
@@ -61,6 +63,7 @@ class AxisEvidence:
     floor: float
     above: bool = False
     left: bool = False
+    silent: bool = False
 
     @property
     def quiet(self) -> bool:
@@ -69,6 +72,8 @@ class AxisEvidence:
 
     def has_gap(self, settings: Settings, *, own_residual: bool) -> bool:
         """Whether anything is to be explained; ``own_residual``: residuals of other axes do not show here."""
+        if self.silent:
+            return False
         seen = self.excess > settings.largest_scatter and not self.quiet
         broke_off = not np.isfinite(self.refitted)
         return self.above or seen or broke_off or (own_residual and self.excess > OF_COLOUR)
@@ -100,6 +105,7 @@ def axis_verdicts(
         tuple(k for k, c in enumerate(causes) if i in c.axes or (gap and not c.axes))
         for i, gap in enumerate(gaps, start=1)
     ]
+    acting = [() if e.silent else mine for e, mine in zip(evidence, acting, strict=True)]
     labels = [
         _label(arm, e, gap, mine, causes, settings, own_residual=own_residual)
         for e, gap, mine in zip(evidence, gaps, acting, strict=True)
@@ -112,7 +118,7 @@ def axis_verdicts(
             labels[i] = "explained_in_part" if arm == "explained" and evidence[i].left else arm
             acting[i] = acting[i] if arm == "unknown" else tuple(sorted({*acting[i], *whole}))
     return tuple(
-        AxisVerdict(i, label, e.excess, e.explained, mine)
+        AxisVerdict(i, label, *(0.0, 0.0) if e.silent else (e.excess, e.explained), mine)
         for i, (label, e, mine) in enumerate(zip(labels, evidence, acting, strict=True), start=1)
     )
 
@@ -126,7 +132,9 @@ def _label(
     settings: Settings,
     *,
     own_residual: bool,
-) -> VerdictKind:
+) -> AxisVerdictKind:
+    if evidence.silent:
+        return "not_judged"
     if arm == "none" or not (gap or acting):
         return "none"
     if own_residual and not acting and evidence.left:
@@ -149,7 +157,7 @@ def _removed(
 def _stand_for_the_arm(
     arm: VerdictKind,
     evidence: Sequence[AxisEvidence],
-    labels: Sequence[VerdictKind],
+    labels: Sequence[AxisVerdictKind],
     acting: Sequence[Sequence[int]],
     whole: Sequence[int],
 ) -> list[int]:
@@ -157,13 +165,14 @@ def _stand_for_the_arm(
     if arm == "unknown":
         return [_leading(evidence, labels)]
     if whole:
-        return list(range(len(labels)))
+        return [i for i, e in enumerate(evidence) if not e.silent]
     return [i for i, mine in enumerate(acting) if mine] or [_leading(evidence, labels)]
 
 
-def _leading(evidence: Sequence[AxisEvidence], labels: Sequence[VerdictKind]) -> int:
+def _leading(evidence: Sequence[AxisEvidence], labels: Sequence[AxisVerdictKind]) -> int:
     """Return the axis (from 0) with the largest gap of those without an explanation, if there are any."""
-    free = [i for i, label in enumerate(labels) if label == "none"] or list(range(len(labels)))
+    free = [i for i, label in enumerate(labels) if label == "none"]
+    free = free or [i for i, e in enumerate(evidence) if not e.silent]
 
     def size(i: int) -> tuple[float, float]:
         above = evidence[i].refitted ** 2 - evidence[i].floor ** 2
@@ -190,7 +199,11 @@ def with_axes_agreed(
         left.tolist(),
         strict=True,
     )
-    evidence = [AxisEvidence(a.excess, a.explained, *row) for a, *row in figures]
+    silent = stages.given.silent
+    evidence = [
+        AxisEvidence(a.excess, a.explained, before, after, floor, above, left, a.axis - 1 in silent)
+        for a, before, after, floor, above, left in figures
+    ]
     still_open = {x for group in open_groups(conclusion, len(evidence)) for x in group}
     causes = [
         Acting(c.axes or (() if c.axis is None else (c.axis,)), c.label in still_open)

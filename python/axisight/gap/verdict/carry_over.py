@@ -50,6 +50,7 @@ def carried_over(
     stepped: NDArray[np.bool_] | None = None,
     *,
     differentiated: bool = False,
+    refuted: float = 1.0,
 ) -> Conclusion:
     """Return the conclusion, or *unknown* with the reason where the validation logs contradict it.
 
@@ -66,13 +67,15 @@ def carried_over(
     - ``removed``: share of the validation residual above noise that the causes remove; None if unknown.
     - ``differentiated``: whether torques are predicted from differentiated positions. Their noise lies in the band
       that is compared, so that no average over the log removes it.
+    - ``refuted``: factor by which the model lowered the noise of the estimation logs [1]. Noise as large as the torque
+      is no less doubtful for that.
     - ``stepped`` (n_axes,): axes whose noise comes from encoder steps; none by default.
     """
     withdrawn = None
     labels = tuple(cause.label for cause in conclusion.causes)
     if gap.refitted > _SEEN and gap.floor > _ABSURD * gap.refitted:
         withdrawn = Withdrawal("noise", gap.before, gap.refitted, gap.floor)
-    elif differentiated and hides_all(gap.floor):
+    elif differentiated and hides_all(gap.floor / refuted):
         withdrawn = Withdrawal("loud", gap.before, gap.refitted, gap.floor)
     elif own is not None:
         # Another motion may show more of what no effect explains, and as much of the causes.
@@ -173,7 +176,7 @@ def _floor(stages: Stages, stepped: NDArray[np.bool_] | None) -> float:
     """Return the mean square of the floor, raised for axes with coarse encoder steps."""
     noise, left = _squares(stages.floor), _squares(stages.after)
     more = np.clip(left - noise, 0.0, _BY_STEPS * noise)
-    return float(np.mean(noise if stepped is None else noise + np.where(stepped, more, 0.0)))
+    return float(np.nanmean(noise if stepped is None else noise + np.where(stepped, more, 0.0)))
 
 
 def _no_fall(
@@ -198,7 +201,7 @@ def _no_fall(
     if share >= 0.5 * settings.explained_share:
         return Withdrawal("part", gap.before, gap.after, gap.floor, causes=causes)
     before, after = _squares(stages.given), _squares(stages.after)
-    log, axis = divmod(int(np.argmax(after - before)), after.shape[1])
+    log, axis = divmod(int(np.nanargmax(after - before)), after.shape[1])
     return _on("fall", stages, (log, axis), before, after, names, causes)
 
 
@@ -221,7 +224,7 @@ def _above_floor(stages: Stages, names: Sequence[str]) -> Withdrawal | None:
     excess = above_floor(stages.refitted, stages)
     if not np.any(excess > 0):
         return None
-    log, axis = divmod(int(np.argmax(excess)), excess.shape[1])
+    log, axis = divmod(int(np.nanargmax(excess)), excess.shape[1])
     return _on("none", stages, (log, axis), left, left, names)
 
 

@@ -17,6 +17,7 @@ from axisight.gap.facts.result import AxisVerdict, Candidate, Interval, VerdictK
 from axisight.gap.facts.settings import Settings
 from axisight.gap.facts.trace import Adjustment, log_odds
 from axisight.gap.facts.withdrawal import Withdrawal
+from axisight.gap.facts.wording import listed
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.held_out import held_out_loss
 from axisight.gap.ranking.intervals import intervals
@@ -372,6 +373,12 @@ def _checks(found: SearchState, settings: Settings, explained: float) -> tuple[s
         f"re-fitted, {left:.3f} with the causes (1 is noise plus {100 * settings.model_error:g} % model error).",
         f"Share of the explainable error removed on held-out estimation data: {100 * explained:.1f} %.",
     ]
+    if refuted := np.flatnonzero(found.noise < 1.0).tolist():
+        less = listed([f"{1 / found.noise[i]:.2g} times on axis {i + 1}" for i in refuted])
+        out.append(
+            "The estimated noise is more than what the model leaves on data left out of its fit: "
+            f"{less}. What the model leaves is the floor there."
+        )
     if found.stopped is not None:
         by_then = ", ".join(found.stopped.causes) or "none"
         out.append(f"{found.stopped.words} Causes of finished rounds: {by_then}.")

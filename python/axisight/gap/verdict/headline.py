@@ -101,9 +101,21 @@ def headline(facts: Facts) -> str:
     else:
         said = _explained(facts)
     said = said if facts.stopped is None else [facts.stopped.words, *said]
+    said = [*said, _not_judged(facts)]
     text = with_joints(" ".join(x for x in said if x), facts.joints)
     log = "" if facts.withdrawn is None else facts.withdrawn.log or ""
     return text.replace(_LOG, log)
+
+
+def _not_judged(facts: Facts) -> str:
+    """Return which axes are not judged; empty without one."""
+    axes = [a.axis for a in facts.axes if a.verdict == "not_judged"]
+    if not axes:
+        return ""
+    are, carry, its = (
+        ("are", "carry", "their torques") if len(axes) > 1 else ("is", "carries", "its torque")
+    )
+    return f"{_capital(place(axes, 0))} {are} not judged: {its} {carry} nothing."
 
 
 def within_tolerances(gap: Gap) -> list[int]:
@@ -157,7 +169,7 @@ def _none(facts: Facts) -> list[str]:
         out.append(_refitted(facts))
     loud = [i for i, x in enumerate(gap.floor_per_axis.tolist(), start=1) if hides_all(x)]
     if loud:
-        most = percent(float(max(gap.floor_per_axis)))
+        most = percent(float(max(gap.floor_per_axis[i - 1] for i in loud)))
         out.append(
             f"Noise hides much on {place(loud, facts.n_axes)}: it is {most} of the {_torque(facts)} there."
             if len(loud) == 1

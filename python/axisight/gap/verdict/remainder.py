@@ -43,7 +43,7 @@ def remainder_of(
         return Remainder(total, per_axis)
     bands = band_map(logs, settings.block_s)
     regimes = regime_maps(logs, settings.bandwidth_hz, settings.block_s)
-    shares = per_axis**2 / max(float(np.sum(per_axis**2)), 1e-300)
+    shares = per_axis**2 / max(float(np.nansum(per_axis**2)), 1e-300)
     of = "of what remains of the squared gap above the floor"
     where = sorted(
         (
@@ -101,7 +101,7 @@ def refit_worse(stages: Stages, names: Sequence[str]) -> tuple[Finding, ...]:
     ``names``: of the logs.
     """
     given, refitted, floor = (
-        np.mean(stage.per_log(), axis=1) for stage in (stages.given, stages.refitted, stages.floor)
+        stage.by_log() for stage in (stages.given, stages.refitted, stages.floor)
     )
     out = []
     for name, before, after, noise in zip(names, given, refitted, floor, strict=True):

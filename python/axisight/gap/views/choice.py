@@ -21,14 +21,15 @@ def view_of(
     validation: Sequence[Log],
     settings: Settings,
     commanded: Commanded | None = None,
+    silent: Sequence[int] = (),
 ) -> View:
     """Return the closed-loop view if the robot and all logs allow it, else inverse dynamics.
 
-    ``commanded``: given if no torque was logged; then positions are compared, and all logs belong to
-    ``commanded``.
+    ``silent``: axes (from 0) that are not judged by inverse dynamics. ``commanded``: given if no torque was
+    logged; then positions are compared, and all logs belong to ``commanded``.
     """
     if commanded is not None:
         return TargetsView(commanded, list(estimation), settings)
     if is_closed_loop(robot, [*estimation, *validation]):
         return ClosedLoopView(robot, list(estimation), settings)
-    return InverseView(robot, list(estimation), settings, validation)
+    return InverseView(robot, list(estimation), settings, validation, silent)

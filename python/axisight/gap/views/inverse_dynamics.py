@@ -61,7 +61,12 @@ class InverseView(View):
     """
 
     def __init__(
-        self, robot: Robot, logs: list[Log], settings: Settings, held_out: Sequence[Log] = ()
+        self,
+        robot: Robot,
+        logs: list[Log],
+        settings: Settings,
+        held_out: Sequence[Log] = (),
+        silent: Sequence[int] = (),
     ) -> None:
         cutoff = settings.cutoff_hz
         nyquist_hz = 0.5 / logs[0].sample_time_s
@@ -79,7 +84,7 @@ class InverseView(View):
         )
         self._sample_time_s = logs[0].sample_time_s
         self.noise = InverseNoise.of(robot, logs, self.filtering, settings.seed)
-        floor = inverse_floor(logs, self.noise, settings)
+        floor = inverse_floor(logs, self.noise, settings, silent)
         motions = [self._as_rigid(robot, log) for log in logs]
         self._dry_friction_nm = dry_friction_nm(motions, _without_effects(robot))
         fitter = InverseDynamicsFitter(
@@ -93,6 +98,7 @@ class InverseView(View):
         super().__init__(
             "inverse_dynamics", robot, logs, settings, fitter, floor, self.filtering.cutoff_hz
         )
+        self.silent = tuple(silent)
         self.unfelt = other_controllers_of_targets(robot, logs)
 
     def _certain(self, logs: Sequence[Log], motions: Sequence[Motion], floor: Floor) -> list[Array]:
@@ -159,10 +165,13 @@ class InverseView(View):
     ) -> list[Array]:
         """Return the error (n, n_axes) [Nm] that noise of position and torque causes, for each log."""
         del variant
-        return [
+        out = [
             self.counted(log) * self.noise.error(log, run)
             for run, log in enumerate(logs, start=first_run)
         ]
+        for noise in out:
+            noise[:, list(self.silent)] = 0.0
+        return out
 
     def left_open(self, logs: Sequence[Log]) -> list[Array]:
         """Return the standard deviation (n, n_axes) [Nm] that dry friction leaves open near standstill.
@@ -348,13 +357,20 @@ class InverseDynamicsFitter(ModelFitter):
         )
 
 
-def inverse_floor(logs: Sequence[Log], noise: InverseNoise, settings: Settings) -> Floor:
-    """Return the floor of a predicted torque, from its noise and the model error."""
+def inverse_floor(
+    logs: Sequence[Log], noise: InverseNoise, settings: Settings, silent: Sequence[int] = ()
+) -> Floor:
+    """Return the floor of a predicted torque, from its noise and the model error.
+
+    ``silent``: axes (from 0) whose torque carries nothing; they have next to no weight.
+    """
     rate = 1.0 / logs[0].sample_time_s
     variance = np.mean([np.var(x.torque_nm, axis=0) for x in logs], axis=0)
     # The variance of drawn noise scatters by a few per cent from log to log, and so does its estimate.
     noise_variance = np.mean([noise.error(x, i).var(axis=0) for i, x in enumerate(logs)], axis=0)
     total = np.maximum(noise_variance + settings.model_error**2 * variance, 1e-12 * variance)
+    # Their errors are below rounding then, and so is their floor.
+    total[list(silent)] = 1.0 / np.finfo(np.float64).eps ** 2
     filtering = noise.filtering
     decimation = max(1, int(rate / (2 * filtering.cutoff_hz)))
     frequency_hz = np.linspace(0.0, rate / (2 * decimation), _FREQUENCIES)

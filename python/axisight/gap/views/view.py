@@ -57,6 +57,8 @@ class View(ABC):
     """Causes that the logs show without a fit, and that do not change the compared torque."""
     not_offered: frozenset[str] = frozenset()
     """Labels of effects that the logs decide without a fit; they are no candidates."""
+    silent: tuple[int, ...] = ()
+    """Axes (from 0) whose torque carries nothing: they have no error, no candidates and no verdict."""
 
     @property
     def lowpass_hz(self) -> float | None:
@@ -86,6 +88,7 @@ class View(ABC):
             layout = layout_of(model)
             predicted = layout.by_axis(held_out_loss(model)) / layout.samples()
             enough = np.where(predicted > enough, -1.0, enough)
+        enough[list(self.silent)] = np.inf
         at = situation(
             self.logs,
             model,
@@ -137,9 +140,11 @@ class View(ABC):
         return np.ones((log.n_samples, 1))
 
     def errors(self, torques: Sequence[Array], logs: Sequence[Log]) -> list[Array]:
-        """Return the weighted errors of predicted torques on logs, (n, n_axes) [Nm] each."""
+        """Return the weighted errors of predicted torques on logs, (n, n_axes) [Nm] each; zero on silent axes."""
+        judged = np.ones(self.robot.n_axes)
+        judged[list(self.silent)] = 0.0
         return [
-            self.counted(log) * (torque - self.measured(log))
+            judged * self.counted(log) * (torque - self.measured(log))
             for torque, log in zip(torques, logs, strict=True)
         ]
 

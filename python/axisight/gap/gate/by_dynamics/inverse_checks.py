@@ -58,7 +58,7 @@ def check_inverse(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     # Small errors are those of a model that is right otherwise.
     if refused(out) or without_gravity:
         return out
-    moves = np.all([travels(log) for log in logs], axis=0)
+    moves = np.all([travels(log) & (np.ptp(log.torque_nm, axis=0) > 0) for log in logs], axis=0)
     return [*out, *check_small_errors(robot, motions, moves)]
 
 

@@ -149,7 +149,8 @@ def _projected(at: Motion, base: Array, effects: list[Array]) -> tuple[Array, li
     for i in range(torque.shape[1]):
         own = np.column_stack([base[:, i], nuisance(at[1][:, i])])
         basis, _ = np.linalg.qr(own)
-        scale = max(float(torque[:, i].std()), 1e-300)
+        # A torque that never changes says nothing.
+        scale = float(torque[:, i].std()) or np.inf
         target[:, i] = (torque[:, i] - basis @ (basis.T @ torque[:, i])) / scale
         for column, effect in zip(columns, effects, strict=True):
             column[:, i] = (effect[:, i] - basis @ (basis.T @ effect[:, i])) / scale
