@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import astuple
 
 import numpy as np
 
@@ -51,10 +52,7 @@ def _found(robot: Robot, logs: Sequence[Log]) -> dict[int, Swing]:
     for axis in robot.axis_numbers():
         seen = [swing for row in each if (swing := row[axis - 1]) is not None]
         if seen:
-            measured, simulated, play = np.median(
-                [(s.measured_rad, s.simulated_rad, s.play_rad) for s in seen], axis=0
-            )
-            out[axis] = Swing(float(measured), float(simulated), float(play))
+            out[axis] = Swing(*map(float, np.median([astuple(s) for s in seen], axis=0)))
     return out
 
 

@@ -23,11 +23,13 @@ class Swing:
     - ``measured_rad``: half the distance between the medians under torque one way and the other.
     - ``simulated_rad``: the same for the torque over the simulator's stiffness; zero for a rigid gear.
     - ``play_rad``: the part of ``measured_rad`` that does not grow with the torque; impacts in the gap make it smaller.
+    - ``middle_rad``: the deflection without torque, in the middle of the play. It is zero for encoders of one zero.
     """
 
     measured_rad: float
     simulated_rad: float
     play_rad: float
+    middle_rad: float
 
 
 def deflection(log: Log, robot: Robot) -> Array | None:
@@ -37,8 +39,26 @@ def deflection(log: Log, robot: Robot) -> Array | None:
     """
     if log.joint_position_rad is None:
         return None
-    apart = log.position_rad * robot.gear_ratio - log.joint_position_rad
+    apart = _between_encoders(log, robot)
     return np.asarray(apart - np.median(apart, axis=0))
+
+
+def _between_encoders(log: Log, robot: Robot) -> Array:
+    """Return the angle between the encoders of a log with joint encoders (n, n_axes) [rad, joint side]."""
+    assert log.joint_position_rad is not None  # checked before
+    return np.asarray(log.position_rad * robot.gear_ratio - log.joint_position_rad)
+
+
+def deflection_at_start(log: Log, robot: Robot) -> Array:
+    """Return the deflection of the gears at the first sample (n_axes,) [rad, joint side]; NaN where it does not show.
+
+    It shows on axes with a joint encoder whose torque turns round: then the zero of the encoder is known.
+    """
+    out = np.full(robot.n_axes, np.nan)
+    for i, swing in enumerate(swings(log, robot)):
+        if swing is not None:
+            out[i] = _between_encoders(log, robot)[0, i] - swing.middle_rad
+    return out
 
 
 def play_rad(logs: Sequence[Log], robot: Robot, index: int) -> float:
@@ -56,14 +76,11 @@ def play_rad(logs: Sequence[Log], robot: Robot, index: int) -> float:
 
 def swings(log: Log, robot: Robot) -> list[Swing | None]:
     """Return the swing of every gear in a log; None without a joint encoder, or if the torque never turns round."""
-    apart = deflection(log, robot)
-    if apart is None:
+    if log.joint_position_rad is None:
         return [None] * robot.n_axes
-    torque = _joint_torque(log, robot)
-    return [
-        _swing(apart[:, i], torque[:, i], _stiffness(robot, axis))
-        for i, axis in enumerate(robot.axis_numbers())
-    ]
+    apart = _between_encoders(log, robot)
+    torque, stiffness = joint_torque(log, robot), stiffnesses(robot)
+    return [_swing(apart[:, i], torque[:, i], stiffness[i]) for i in range(robot.n_axes)]
 
 
 def _swing(apart: Array, torque: Array, stiffness: float) -> Swing | None:
@@ -78,21 +95,25 @@ def _swing(apart: Array, torque: Array, stiffness: float) -> Swing | None:
     # A line through both: what is left of it without torque is play.
     slope = (strong[0] - weak[0]) / (strong[1] - weak[1])
     play = min(max(weak[0] - slope * weak[1], 0.0), strong[0])
-    return Swing(strong[0], strong[1] / stiffness, play)
+    return Swing(strong[0], strong[1] / stiffness, play, strong[2] - slope * strong[3])
 
 
 def _to_either_side(
     apart: Array, torque: Array, chosen: NDArray[np.bool_]
-) -> tuple[float, float] | None:
-    """Return half the distance between the medians of deflection and torque one way and the other; None if one-way."""
+) -> tuple[float, float, float, float] | None:
+    """Return half the distance between the medians of deflection and torque one way and the other, and their middles.
+
+    None if the torque acts one way only.
+    """
     ways = [chosen & (torque > 0), chosen & (torque < 0)]
     if min(float(way.mean()) for way in ways) < EACH_WAY:
         return None
     bent, load = ([float(np.median(x[way])) for way in ways] for x in (apart, torque))
-    return 0.5 * (bent[0] - bent[1]), 0.5 * (load[0] - load[1])
+    far, middle = ([0.5 * (x[0] + sign * x[1]) for x in (bent, load)] for sign in (-1, 1))
+    return far[0], far[1], middle[0], middle[1]
 
 
-def _joint_torque(log: Log, robot: Robot) -> Array:
+def joint_torque(log: Log, robot: Robot) -> Array:
     """Return the torque that links and gravity take from the gears (n, n_axes) [Nm, joint side]."""
     angle = log.position_rad * robot.gear_ratio
     moved = angle
@@ -108,7 +129,8 @@ def _joint_torque(log: Log, robot: Robot) -> Array:
     return np.asarray(robot.inverse_dynamics(*joints)[:, robot.axis_joints])
 
 
-def _stiffness(robot: Robot, axis: int) -> float:
-    """Return the stiffness of a gear [Nm/rad]; infinite for a rigid one."""
-    name = robot.axis_parameter(axis, "stiffness")
-    return float("inf") if name is None else robot.parameters()[name]
+def stiffnesses(robot: Robot) -> Array:
+    """Return the stiffness of the gears (n_axes,) [Nm/rad]; infinite for rigid ones."""
+    values = robot.parameters()
+    names = [robot.axis_parameter(axis, "stiffness") for axis in robot.axis_numbers()]
+    return np.array([np.inf if name is None else values[name] for name in names])

@@ -1,0 +1,92 @@
+"""Logs of targets and positions with an encoder on motor and joint: what the joint encoder shows takes part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from axisight import Effect, Log, Robot, diagnose, load_robot, simulate
+from axisight.gap import Diagnosis
+
+ARM = """
+schema = "axisight.robot/2"
+name = "lever"
+gravity = [0.0, 0.0, -9.81]
+sample_time = 0.002
+
+[[joint]]
+name = "lever"
+kind = "driven"
+motion = "revolute"
+origin = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+stiffness = 250.0
+damping = 1.0
+
+[joint.link]
+mass = 1.5
+com = [0.0, 0.0, -0.2]
+inertia = [0.01, 0.01, 0.001, 0.0, 0.0, 0.0]
+
+[joint.drive]
+gear_ratio = 1.0
+motor_inertia = 0.06
+viscous_friction = 0.8
+
+[controller]
+kind = "pd_position"
+kp = [150.0]
+kd = [6.0]
+velocity_feedforward = false
+
+[sensor]
+position_noise_std = 2e-5
+"""
+NOISE_RAD = 2e-5
+SECONDS = 10.0
+PLAY = Effect("backlash", 1, {"half_width_rad": 0.025, "damped": 0.02})
+SOFTER = Effect("joint_stiffness", 1, {"relative_change": -0.4})
+
+
+@pytest.fixture(scope="module")
+def lever(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    path: Path = tmp_path_factory.mktemp("lever") / "lever.toml"
+    path.write_text(ARM, "utf-8")
+    return load_robot(path)
+
+
+def recorded(robot: Robot, run: int, *effects: Effect) -> Log:
+    """Return a log of targets and positions of the robot with ``effects``, with an encoder on the joint."""
+    rng = np.random.default_rng(run)
+    time = robot.sample_time_s * np.arange(int(SECONDS / robot.sample_time_s))
+    waves = [
+        a * np.sin(2 * np.pi * f * time + p)
+        for f, a, p in zip(
+            (0.31, 0.83, 1.7), (0.5, 0.9, 1.1), rng.uniform(0, 2 * np.pi, 3), strict=True
+        )
+    ]
+    speed = (np.minimum(time, 1.0) * np.sum(waves, axis=0))[:, None]
+    ran = simulate(robot, speed, effects=effects, noise_seed=run, method="rk4", start_rad=[0.3 * (-1) ** run])
+    position = ran["position_rad"].to_numpy()
+    target = position[0] + robot.sample_time_s * (np.cumsum(speed, axis=0) - speed)
+    joint = ran["joint_position_rad"].to_numpy()[:, robot.axis_joints]
+    return Log(
+        name=f"run{run}",
+        source=Path("simulation"),
+        time_s=time,
+        sample_time_s=robot.sample_time_s,
+        position_rad=position,
+        torque_nm=np.full_like(position, np.nan),
+        position_ref_rad=target,
+        joint_position_rad=joint + NOISE_RAD * rng.standard_normal(joint.shape),
+    )
+
+
+def diagnosed(robot: Robot, *effects: Effect, factor: float = 1.0, offset_rad: float = 0.0) -> Diagnosis:
+    """Return the diagnosis of three logs whose joint encoder has a wrong scale or zero."""
+    logs = [recorded(robot, run, *effects) for run in (1, 2, 3)]
+    logs = [replace(x, joint_position_rad=factor * x.joint_position_rad + offset_rad) for x in logs]
+    return diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
