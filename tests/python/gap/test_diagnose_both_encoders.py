@@ -47,6 +47,7 @@ position_noise_std = 2e-5
 """
 NOISE_RAD = 2e-5
 SECONDS = 10.0
+START_RAD = 0.1
 PLAY = Effect("backlash", 1, {"half_width_rad": 0.025, "damped": 0.02})
 SOFTER = Effect("joint_stiffness", 1, {"relative_change": -0.4})
 
@@ -62,14 +63,21 @@ def recorded(robot: Robot, run: int, *effects: Effect) -> Log:
     """Return a log of targets and positions of the robot with ``effects``, with an encoder on the joint."""
     rng = np.random.default_rng(run)
     time = robot.sample_time_s * np.arange(int(SECONDS / robot.sample_time_s))
+    phase = rng.uniform(0, 2 * np.pi, 3)
     waves = [
-        a * np.sin(2 * np.pi * f * time + p)
-        for f, a, p in zip(
-            (0.31, 0.83, 1.7), (0.5, 0.9, 1.1), rng.uniform(0, 2 * np.pi, 3), strict=True
-        )
+        a * (np.sin(2 * np.pi * f * time + p) - np.sin(p))
+        for f, a, p in zip((0.31, 0.83, 1.7), (0.3, 0.2, 0.1), phase, strict=True)
     ]
-    speed = (np.minimum(time, 1.0) * np.sum(waves, axis=0))[:, None]
-    ran = simulate(robot, speed, effects=effects, noise_seed=run, method="rk4", start_rad=[0.3 * (-1) ** run])
+    target = np.minimum(time, 1.0) * np.sum(waves, axis=0)
+    speed = np.diff(target, append=target[-1:])[:, None] / robot.sample_time_s
+    ran = simulate(
+        robot,
+        speed,
+        effects=effects,
+        noise_seed=run,
+        method="rk4",
+        start_rad=[START_RAD * (-1) ** run],
+    )
     position = ran["position_rad"].to_numpy()
     target = position[0] + robot.sample_time_s * (np.cumsum(speed, axis=0) - speed)
     joint = ran["joint_position_rad"].to_numpy()[:, robot.axis_joints]
@@ -85,7 +93,9 @@ def recorded(robot: Robot, run: int, *effects: Effect) -> Log:
     )
 
 
-def diagnosed(robot: Robot, *effects: Effect, factor: float = 1.0, offset_rad: float = 0.0) -> Diagnosis:
+def diagnosed(
+    robot: Robot, *effects: Effect, factor: float = 1.0, offset_rad: float = 0.0
+) -> Diagnosis:
     """Return the diagnosis of three logs whose joint encoder has a wrong scale or zero."""
     logs = [recorded(robot, run, *effects) for run in (1, 2, 3)]
     logs = [replace(x, joint_position_rad=factor * x.joint_position_rad + offset_rad) for x in logs]

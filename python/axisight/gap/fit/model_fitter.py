@@ -22,9 +22,12 @@ from axisight.fitting import (
 )
 from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis, NormalEquations
+from axisight.gap.fit.gear_rows import GearRows, fit_loss, gear_rows
+from axisight.gap.fit.held_out import linear_gain, linear_step
 from axisight.gap.fit.rank_deficiency import deviations_seen
 from axisight.gap.fit.time_limit import TimeLimit
 from axisight.gap.fit.work_count import WorkCount
+from axisight.gap.simulator.gear_readings import GearReadings
 from axisight.gap.simulator.natural_sizes import NaturalSizes
 from axisight.gap.simulator.own_parameters import for_core
 from axisight.gap.simulator.tolerances import spring_changes, tolerance_of
@@ -36,6 +39,8 @@ Array = NDArray[np.float64]
 # Relative fall of the loss at which a fit ends: for fits of causes, and for fits of candidates.
 _TOLERANCE = 1e-4
 _TRIAL_TOLERANCE = 1e-3
+# Change of a parameter for a difference, as a share of its natural size.
+_DIFFERENCE = 0.1
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,7 @@ class ModelFitter(ABC):
         self.time_limit = TimeLimit.none()
         self.tolerances = tolerances
         self.natural: NaturalSizes | None = None
+        self.gears: GearReadings | None = None
         self.own = [
             robot_parameter(robot, name, relative_tolerance=tolerance)
             for name, value in robot_parameters(robot).items()
@@ -135,6 +141,7 @@ class ModelFitter(ABC):
     def part(self, logs: Sequence[int]) -> ModelFitter:
         """Return a copy for some of the logs, by their numbers; both share one cancellation."""
         other = copy(self)
+        other.gears = None if self.gears is None else self.gears.part(logs)
         other._keep(logs)
         return other
 
@@ -259,7 +266,62 @@ class ModelFitter(ABC):
         if isinstance(result, Diverged):
             return result
         self.work.fit(result.iterations, result.evaluations)
-        return _fitted_model(result, setup, list(free), renewed=renewed, counted=self.counted())
+        found = _fitted_model(result, setup, list(free), renewed=renewed, counted=self.counted())
+        if self.gears is None:
+            return found
+        found = self._gear_rows(found, setup, result.theta).added_to_fit(found)
+        return self._continued(found, setup, options, near)
+
+    def _continued(
+        self, found: FittedModel, setup: _Setup, options: FitOptions, near: _core.Courses | None
+    ) -> FittedModel:
+        """Return a fit continued to the minimum of all rows: the core minimises without those of gears."""
+        names = _names(setup)
+        for _ in range(options.max_iterations):
+            if linear_gain(found) < options.loss_tolerance * found.total:
+                break
+            by = dict(zip(found.parameters, linear_step(found), strict=True))
+            values = [
+                found.robot_values[name]
+                if place is None
+                else (found.effects[place].parameters or {})[name]
+                for place, name in names
+            ]
+            moved = replace(
+                setup,
+                parameters=[
+                    replace(p, initial=min(max(at + float(by.get(key, 0.0)), p.lower), p.upper))
+                    for p, at, key in zip(setup.parameters, values, names, strict=True)
+                ],
+            )
+            still = replace(options, max_iterations=0)
+            result = self.solve(*self._for_core(moved), still, moved.warm, near)
+            if isinstance(result, Diverged):
+                break
+            self.work.fit(1, result.evaluations)
+            there = _fitted_model(
+                result, moved, found.free, renewed=found.renewed, counted=self.counted()
+            )
+            there = self._gear_rows(there, moved, result.theta).added_to_fit(there)
+            if not fit_loss(there) < fit_loss(found):
+                break
+            found = replace(there, status=found.status)
+        return found
+
+    def _gear_rows(self, at: NormalEquations, setup: _Setup, theta: Array) -> GearRows:
+        """Return the rows of gears at the values ``theta`` (n_parameters,) of all parameters of a fit."""
+        assert self.gears is not None
+        own: dict[str, float] = {}
+        effects = list(setup.effects)
+        steps: dict[tuple[int | None, str], float] = {}
+        for p, value in zip(setup.parameters, theta.tolist(), strict=True):
+            if p.effect is None:
+                own[p.name] = value
+            else:
+                effects[p.effect] = effects[p.effect].with_values({p.name: value})
+            step = _DIFFERENCE * p.scale
+            steps[p.effect, p.name] = step if value + step <= p.upper else -step
+        return gear_rows(self.gears, at.parameters, own, effects, [steps[n] for n in at.parameters])
 
     def evaluate(
         self,
@@ -312,7 +374,11 @@ class ModelFitter(ABC):
         if isinstance(result, Diverged):
             return result
         self.work.linearization()
-        return replace(_linearized(result, setup), jacobian=tuple(result.columns))
+        found = replace(_linearized(result, setup), jacobian=tuple(result.columns))
+        if self.gears is None:
+            return found
+        blocks = np.array(result.blocks, dtype=np.int64).reshape(-1, 4)
+        return self._gear_rows(found, setup, result.theta).added(found, blocks[:, 0], blocks[:, 1])
 
     def replaced(self, free: Sequence[Hypothesis]) -> set[str]:
         """Return the robot's parameters that the effects replace."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,16 +49,20 @@ def _between_encoders(log: Log, robot: Robot) -> Array:
     return np.asarray(log.position_rad * robot.gear_ratio - log.joint_position_rad)
 
 
-def deflection_at_start(log: Log, robot: Robot) -> Array:
-    """Return the deflection of the gears at the first sample (n_axes,) [rad, joint side]; NaN where it does not show.
+def deflections_at_start(logs: Sequence[Log], robot: Robot) -> Array:
+    """Return the deflection of the gears at the first sample of each log (n_logs, n_axes) [rad, joint side].
 
-    It shows on axes with a joint encoder whose torque turns round: then the zero of the encoder is known.
+    The zero of a joint encoder shows in logs whose torque turns round, and is the same in all. NaN where it does not
+    show, and on axes without a joint encoder.
     """
-    out = np.full(robot.n_axes, np.nan)
-    for i, swing in enumerate(swings(log, robot)):
-        if swing is not None:
-            out[i] = _between_encoders(log, robot)[0, i] - swing.middle_rad
-    return out
+    seen = np.full((len(logs), robot.n_axes), np.nan)
+    at = seen.copy()
+    for k, log in enumerate(logs):
+        if log.joint_position_rad is not None:
+            at[k] = _between_encoders(log, robot)[0]
+            seen[k] = [np.nan if s is None else s.middle_rad for s in swings(log, robot)]
+    zero = [np.median(x[np.isfinite(x)]) if np.isfinite(x).any() else np.nan for x in seen.T]
+    return np.asarray(at - np.array(zero))
 
 
 def play_rad(logs: Sequence[Log], robot: Robot, index: int) -> float:
@@ -76,41 +80,92 @@ def play_rad(logs: Sequence[Log], robot: Robot, index: int) -> float:
 
 def swings(log: Log, robot: Robot) -> list[Swing | None]:
     """Return the swing of every gear in a log; None without a joint encoder, or if the torque never turns round."""
+    stiffness = stiffnesses(robot)
+    return [
+        None if bends is None else _swing(bends, stiffness[i])
+        for i, bends in enumerate(bends_of(log, robot))
+    ]
+
+
+@dataclass(frozen=True)
+class Bend:
+    """Deflection of a gear under torques of about one size, to either side.
+
+    - ``deflection_rad``, ``torque_nm``: half the distance between the medians under torque one way and the other.
+    - ``middle_rad``, ``middle_nm``: the middle between these medians.
+    - ``scatter_rad``: median distance of the deflections from the law of both sizes.
+    """
+
+    deflection_rad: float
+    torque_nm: float
+    middle_rad: float
+    middle_nm: float
+    scatter_rad: float = 0.0
+
+
+def bends_of(log: Log, robot: Robot) -> list[tuple[Bend, Bend] | None]:
+    """Return the deflection of every gear in a log under weak and under strong torque, joint side.
+
+    None for an axis without a joint encoder, and for one whose torque never turns round. Weak torque is the third
+    quarter by size, strong torque the last one.
+    """
     if log.joint_position_rad is None:
         return [None] * robot.n_axes
-    apart = _between_encoders(log, robot)
-    torque, stiffness = joint_torque(log, robot), stiffnesses(robot)
-    return [_swing(apart[:, i], torque[:, i], stiffness[i]) for i in range(robot.n_axes)]
+    apart, torque = _between_encoders(log, robot), joint_torque(log, robot)
+    return [bends_along(apart[:, i], torque[:, i]) for i in range(robot.n_axes)]
 
 
-def _swing(apart: Array, torque: Array, stiffness: float) -> Swing | None:
+def bends_along(apart: Array, torque: Array) -> tuple[Bend, Bend] | None:
+    """Return the bends (weak, strong) of one gear from its deflection and torque (n,); None as in `bends_of`."""
     if not np.isfinite(apart).all():
         return None
     size = np.abs(torque)
     small, large = np.quantile(size, [0.5, 0.75])
-    weak = _to_either_side(apart, torque, (size > small) & (size <= large))
-    strong = _to_either_side(apart, torque, size > large)
+    chosen = [(size > small) & (size <= large), size > large]
+    weak, strong = (_to_either_side(apart, torque, x) for x in chosen)
     if weak is None or strong is None:
         return None
+    slope = _slope(weak, strong)
+
+    def scatter(bend: Bend, which: NDArray[np.bool_]) -> float:
+        way = np.sign(torque[which])
+        load = torque[which] - bend.middle_nm - way * bend.torque_nm
+        at = bend.middle_rad + way * bend.deflection_rad + slope * load
+        return float(np.median(np.abs(apart[which] - at)))
+
+    first, second = (
+        replace(x, scatter_rad=scatter(x, which))
+        for x, which in zip((weak, strong), chosen, strict=True)
+    )
+    return first, second
+
+
+def _slope(weak: Bend, strong: Bend) -> float:
+    """Return by how much the deflection grows with the torque [rad/Nm]."""
+    return (strong.deflection_rad - weak.deflection_rad) / (strong.torque_nm - weak.torque_nm)
+
+
+def _swing(bends: tuple[Bend, Bend], stiffness: float) -> Swing:
+    weak, strong = bends
     # A line through both: what is left of it without torque is play.
-    slope = (strong[0] - weak[0]) / (strong[1] - weak[1])
-    play = min(max(weak[0] - slope * weak[1], 0.0), strong[0])
-    return Swing(strong[0], strong[1] / stiffness, play, strong[2] - slope * strong[3])
+    slope = _slope(weak, strong)
+    play = min(max(weak.deflection_rad - slope * weak.torque_nm, 0.0), strong.deflection_rad)
+    middle = strong.middle_rad - slope * strong.middle_nm
+    return Swing(strong.deflection_rad, strong.torque_nm / stiffness, play, middle)
 
 
-def _to_either_side(
-    apart: Array, torque: Array, chosen: NDArray[np.bool_]
-) -> tuple[float, float, float, float] | None:
-    """Return half the distance between the medians of deflection and torque one way and the other, and their middles.
-
-    None if the torque acts one way only.
-    """
+def _to_either_side(apart: Array, torque: Array, chosen: NDArray[np.bool_]) -> Bend | None:
+    """Return the deflection under the ``chosen`` samples' torque, without its scatter; None if it acts one way only."""
     ways = [chosen & (torque > 0), chosen & (torque < 0)]
     if min(float(way.mean()) for way in ways) < EACH_WAY:
         return None
     bent, load = ([float(np.median(x[way])) for way in ways] for x in (apart, torque))
-    far, middle = ([0.5 * (x[0] + sign * x[1]) for x in (bent, load)] for sign in (-1, 1))
-    return far[0], far[1], middle[0], middle[1]
+    return Bend(
+        deflection_rad=0.5 * (bent[0] - bent[1]),
+        torque_nm=0.5 * (load[0] - load[1]),
+        middle_rad=0.5 * (bent[0] + bent[1]),
+        middle_nm=0.5 * (load[0] + load[1]),
+    )
 
 
 def joint_torque(log: Log, robot: Robot) -> Array:

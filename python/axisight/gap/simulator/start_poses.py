@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.gap.signals.both_encoders import deflection_at_start
+from axisight.gap.signals.both_encoders import deflections_at_start
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -43,15 +43,23 @@ def at_their_poses(robot: Robot, logs: Sequence[Log]) -> list[Log]:
         begins.append(robot.operating_point / robot.gear_ratio)
     apart = np.ptp(begins, axis=0) * np.abs(robot.gear_ratio) if begins else np.zeros(1)
     elsewhere = bool(np.any(apart > OFFSET_RAD))
-    return [log if log.run_up is not None else _at_its_pose(robot, log, elsewhere) for log in logs]
+    deflected = deflections_at_start(logs, robot)
+    return [
+        log if log.run_up is not None else _at_its_pose(robot, log, elsewhere, bent)
+        for log, bent in zip(logs, deflected, strict=True)
+    ]
 
 
-def _at_its_pose(robot: Robot, log: Log, elsewhere: bool) -> Log:
-    """Return a log with the joint angles where its simulation starts; ``elsewhere``: not at the operating point."""
+def _at_its_pose(robot: Robot, log: Log, elsewhere: bool, deflected_rad: Array) -> Log:
+    """Return a log with the joint angles where its simulation starts.
+
+    ``elsewhere``: not at the operating point; ``deflected_rad`` (n_axes,): deflection of the gears at the first sample,
+    NaN where it is unknown.
+    """
     angle = start_of(robot, log.position_rad[0]) if elsewhere else np.array(robot.operating_point)
     motor = robot.equilibrium(angle.tolist())["motor_angle_rad"].values
-    further = deflection_at_start(log, robot) - (motor * robot.gear_ratio - angle)
-    behind = np.abs(further) > OFFSET_RAD  # not where it is unknown (NaN)
+    further = deflected_rad - (motor * robot.gear_ratio - angle)
+    behind = np.abs(further) > OFFSET_RAD
     if not elsewhere and not behind.any():
         return log
     return replace(log, start_rad=np.where(behind, angle - further, angle))
