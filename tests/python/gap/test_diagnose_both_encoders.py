@@ -47,7 +47,7 @@ position_noise_std = 2e-5
 """
 NOISE_RAD = 2e-5
 SECONDS = 10.0
-START_RAD = 0.1
+START_RAD = 0.03
 PLAY = Effect("backlash", 1, {"half_width_rad": 0.025, "damped": 0.02})
 SOFTER = Effect("joint_stiffness", 1, {"relative_change": -0.4})
 
@@ -65,7 +65,7 @@ def recorded(robot: Robot, run: int, *effects: Effect) -> Log:
     time = robot.sample_time_s * np.arange(int(SECONDS / robot.sample_time_s))
     phase = rng.uniform(0, 2 * np.pi, 3)
     waves = [
-        a * (np.sin(2 * np.pi * f * time + p) - np.sin(p))
+        a * np.sin(2 * np.pi * f * time + p)
         for f, a, p in zip((0.31, 0.83, 1.7), (0.3, 0.2, 0.1), phase, strict=True)
     ]
     target = np.minimum(time, 1.0) * np.sum(waves, axis=0)

@@ -28,6 +28,10 @@ class GearRows:
     errors: Array
     slopes: Array
 
+    def fall(self, step: Array) -> float:
+        """Return by how much the loss of the rows falls with a step of the parameters (n_parameters,)."""
+        return float(np.sum(self.errors**2) - np.sum((self.errors + self.slopes @ step) ** 2))
+
     def added(
         self, at: NormalEquations, log: NDArray[np.int64], axis: NDArray[np.int64]
     ) -> NormalEquations:
@@ -43,8 +47,7 @@ class GearRows:
                 if at.parameters:  # else there are no matrices
                     matrix[blocks] += share * (slopes.T @ slopes)
                     gradient[blocks] += share * (slopes.T @ errors)
-        # Sensitivities that are kept for later models do not hold these rows.
-        return replace(at, matrix=matrix, gradient=gradient, loss=loss, jacobian=())
+        return replace(at, matrix=matrix, gradient=gradient, loss=loss)
 
     def added_to_fit(self, fitted: FittedModel) -> FittedModel:
         """Return a fitted model with these rows, also in its standard deviations."""

@@ -23,7 +23,7 @@ from axisight.fitting import (
 from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis, NormalEquations
 from axisight.gap.fit.gear_rows import GearRows, fit_loss, gear_rows
-from axisight.gap.fit.held_out import linear_gain, linear_step
+from axisight.gap.fit.held_out import linear_step
 from axisight.gap.fit.rank_deficiency import deviations_seen
 from axisight.gap.fit.time_limit import TimeLimit
 from axisight.gap.fit.work_count import WorkCount
@@ -39,8 +39,6 @@ Array = NDArray[np.float64]
 # Relative fall of the loss at which a fit ends: for fits of causes, and for fits of candidates.
 _TOLERANCE = 1e-4
 _TRIAL_TOLERANCE = 1e-3
-# Change of a parameter for a difference, as a share of its natural size.
-_DIFFERENCE = 0.1
 
 
 @dataclass(frozen=True)
@@ -269,44 +267,39 @@ class ModelFitter(ABC):
         found = _fitted_model(result, setup, list(free), renewed=renewed, counted=self.counted())
         if self.gears is None:
             return found
-        found = self._gear_rows(found, setup, result.theta).added_to_fit(found)
-        return self._continued(found, setup, options, near)
+        return self._continued(
+            found, self._gear_rows(found, setup, result.theta), setup, options, near
+        )
 
     def _continued(
-        self, found: FittedModel, setup: _Setup, options: FitOptions, near: _core.Courses | None
+        self,
+        found: FittedModel,
+        rows: GearRows,
+        setup: _Setup,
+        options: FitOptions,
+        near: _core.Courses | None,
     ) -> FittedModel:
-        """Return a fit continued to the minimum of all rows: the core minimises without those of gears."""
-        names = _names(setup)
+        """Return a fit with the rows of gears, continued while they promise a gain: the core fits without them."""
+        best = rows.added_to_fit(found)
         for _ in range(options.max_iterations):
-            if linear_gain(found) < options.loss_tolerance * found.total:
+            step = linear_step(best)
+            if rows.fall(step) < options.loss_tolerance * best.total:
                 break
-            by = dict(zip(found.parameters, linear_step(found), strict=True))
-            values = [
-                found.robot_values[name]
-                if place is None
-                else (found.effects[place].parameters or {})[name]
-                for place, name in names
-            ]
-            moved = replace(
-                setup,
-                parameters=[
-                    replace(p, initial=min(max(at + float(by.get(key, 0.0)), p.lower), p.upper))
-                    for p, at, key in zip(setup.parameters, values, names, strict=True)
-                ],
-            )
+            moved = _moved(setup, best, step)
             still = replace(options, max_iterations=0)
             result = self.solve(*self._for_core(moved), still, moved.warm, near)
             if isinstance(result, Diverged):
                 break
             self.work.fit(1, result.evaluations)
             there = _fitted_model(
-                result, moved, found.free, renewed=found.renewed, counted=self.counted()
+                result, moved, best.free, renewed=best.renewed, counted=self.counted()
             )
-            there = self._gear_rows(there, moved, result.theta).added_to_fit(there)
-            if not fit_loss(there) < fit_loss(found):
+            next_rows = self._gear_rows(there, moved, result.theta)
+            there = next_rows.added_to_fit(there)
+            if not fit_loss(there) < fit_loss(best):
                 break
-            found = replace(there, status=found.status)
-        return found
+            best, rows = replace(there, status=best.status), next_rows
+        return best
 
     def _gear_rows(self, at: NormalEquations, setup: _Setup, theta: Array) -> GearRows:
         """Return the rows of gears at the values ``theta`` (n_parameters,) of all parameters of a fit."""
@@ -319,8 +312,7 @@ class ModelFitter(ABC):
                 own[p.name] = value
             else:
                 effects[p.effect] = effects[p.effect].with_values({p.name: value})
-            step = _DIFFERENCE * p.scale
-            steps[p.effect, p.name] = step if value + step <= p.upper else -step
+            steps[p.effect, p.name] = p.scale if value + p.scale <= p.upper else -p.scale
         return gear_rows(self.gears, at.parameters, own, effects, [steps[n] for n in at.parameters])
 
     def evaluate(
@@ -379,6 +371,12 @@ class ModelFitter(ABC):
             return found
         blocks = np.array(result.blocks, dtype=np.int64).reshape(-1, 4)
         return self._gear_rows(found, setup, result.theta).added(found, blocks[:, 0], blocks[:, 1])
+
+    def lasting(self, option: Hypothesis) -> bool:
+        """Whether the sensitivities of a candidate to this error are all in its columns, which later models reuse."""
+        return self.gears is None or not any(
+            self.gears.feels(name, option.effect) for name in option.free
+        )
 
     def replaced(self, free: Sequence[Hypothesis]) -> set[str]:
         """Return the robot's parameters that the effects replace."""
@@ -498,6 +496,18 @@ def _same_quantity(robot: Robot, effect: Effect) -> str | None:
 
 def _names(setup: _Setup) -> list[tuple[int | None, str]]:
     return [(p.effect, p.name) for p in setup.parameters]
+
+
+def _moved(setup: _Setup, found: FittedModel, step: Array) -> _Setup:
+    """Return the setup of a fit with start values a step (n_free,) from where it ended, within the bounds."""
+    by = dict(zip(found.parameters, step.tolist(), strict=True))
+    parameters = []
+    for p, key in zip(setup.parameters, _names(setup), strict=True):
+        place, name = key
+        values = found.robot_values if place is None else found.effects[place].parameters or {}
+        at = values[name] + by.get(key, 0.0)
+        parameters.append(replace(p, initial=min(max(at, p.lower), p.upper)))
+    return replace(setup, parameters=parameters)
 
 
 def _linearized(result: _core.FitResult | _core.Linearization, setup: _Setup) -> NormalEquations:

@@ -17,6 +17,7 @@ from axisight.gap.facts.wording import listed, percent
 from axisight.gap.fit.tolerance_edges import BENT
 from axisight.gap.measure.by_axis import OwnAxes
 from axisight.gap.measure.gap_figures import Stage, Stages
+from axisight.gap.measure.gear_deflections import GearErrors
 from axisight.gap.verdict.conclusion import Conclusion, advice_unknown
 
 Array = NDArray[np.float64]
@@ -50,6 +51,7 @@ def carried_over(
     stepped: NDArray[np.bool_] | None = None,
     *,
     differentiated: bool = False,
+    gears: GearErrors | None = None,
 ) -> Conclusion:
     """Return the conclusion, or *unknown* with the reason where the validation logs contradict it.
 
@@ -57,7 +59,7 @@ def carried_over(
     |---|---|---|
     | causes | they do not shrink the gap there | *unknown* |
     | causes of the size of noise | they do not shrink it, and no log stands above the floor | *none* |
-    | *none* | a log stands above the floor | *unknown* |
+    | *none* | a log stands above the floor, or both encoders contradict a gear | *unknown* |
     | anything | the estimated noise is larger than a gap that is seen | *unknown* |
     | anything | noise of differentiated positions hides any gap | *unknown* |
 
@@ -66,6 +68,7 @@ def carried_over(
     - ``removed``: share of the validation residual above noise that the causes remove; None if unknown.
     - ``differentiated``: whether torques are predicted from differentiated positions. Their noise lies in the band
       that is compared, so that no average over the log removes it.
+    - ``gears``: errors of gears. Causes that remove them need not shrink the gap, which motors may not show.
     - ``stepped`` (n_axes,): axes whose noise comes from encoder steps; none by default.
     """
     withdrawn = None
@@ -81,12 +84,20 @@ def carried_over(
         return _nothing(conclusion)
     elif conclusion.causes:
         withdrawn = _no_fall(stages, gap, names, settings, stepped, labels)
+        if (
+            withdrawn is not None
+            and withdrawn.why in ("fall", "part")
+            and _mend_gears(gears, settings)
+        ):
+            withdrawn = None
         if withdrawn is None and bent >= BENT:
             withdrawn = Withdrawal(
                 "bent", gap.before, gap.after, gap.floor, None, None, labels, bent
             )
     elif conclusion.verdict == "none":
         withdrawn = _above_floor(stages, names)
+        if withdrawn is None and gears is not None and gears.after > settings.significance:
+            withdrawn = Withdrawal("gear", axis=gears.axis, share=gears.after)
     if withdrawn is None:
         return conclusion
     return replace(
@@ -94,6 +105,13 @@ def carried_over(
         next_experiment=_advice(withdrawn),
         withdrawn=withdrawn,
     )
+
+
+def _mend_gears(gears: GearErrors | None, settings: Settings) -> bool:
+    """Whether causes remove the errors of gears that both encoders show."""
+    if gears is None or gears.before <= settings.significance:
+        return False
+    return gears.before**2 - gears.after**2 >= _ENOUGH * (gears.before**2 - 1.0)
 
 
 def _advice(withdrawn: Withdrawal) -> str:
