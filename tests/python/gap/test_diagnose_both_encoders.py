@@ -100,3 +100,61 @@ def diagnosed(
     logs = [recorded(robot, run, *effects) for run in (1, 2, 3)]
     logs = [replace(x, joint_position_rad=factor * x.joint_position_rad + offset_rad) for x in logs]
     return diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
+
+
+def test_play_is_named_with_its_width(lever: Robot) -> None:
+    """The machine's law is the library's own: the width holds in its interval, and to the rounding of a dead zone."""
+    found = diagnosed(lever, PLAY)
+    assert found.verdict == "explained"
+    assert [c.label for c in found.causes] == ["backlash@1"]
+    width = found.causes[0].parameters["half_width_rad"].value
+    assert width == pytest.approx(PLAY.values()[0], rel=0.05)
+
+
+def test_a_softer_gear_is_named_where_the_motors_hardly_show_it(lever: Robot) -> None:
+    """Without the joint encoder the same logs are unknown: the gap of the motors hardly falls."""
+    found = diagnosed(lever, SOFTER)
+    assert found.verdict == "explained"
+    assert [c.label for c in found.causes] == ["joint_stiffness@1"]
+    change = found.causes[0].parameters["relative_change"]
+    assert change.low < SOFTER.values()[0] < change.high
+    assert any("Both encoders contradict the gear of axis 1" in x for x in found.checks)
+    logs = [replace(recorded(lever, run, SOFTER), joint_position_rad=None) for run in (1, 2, 3)]
+    bare = diagnose(robot=lever, estimation=logs[:2], validation=logs[2:])
+    assert "joint_stiffness@1" not in [c.label for c in bare.causes]
+
+
+@pytest.mark.parametrize(
+    ("factor", "offset_rad", "named"),
+    [
+        (1.0, 0.0, []),
+        (1.0, 0.4, []),
+        (-1.0, 0.0, ["sign_flipped"]),
+        (1.15, 0.0, ["position_scaled"]),
+        (180 / np.pi, 0.0, ["position_in_degrees"]),
+    ],
+)
+def test_a_joint_encoder_is_no_cause(
+    lever: Robot, factor: float, offset_rad: float, named: list[str]
+) -> None:
+    """Nothing is withheld. A zero of its own is no fault; wrong signs and scales are set aside by name."""
+    found = diagnosed(lever, factor=factor, offset_rad=offset_rad)
+    assert found.verdict == "none"
+    assert [f.name for f in found.findings] == named
+    assert {f.field for f in found.findings} <= {"joint_position_1"}
+
+
+@pytest.mark.parametrize(
+    "lacks",
+    [
+        Effect("coulomb_friction", 1, {"coulomb_nm": 0.3}),
+        Effect("link_mass", 1, {"relative_change": 0.15}),
+    ],
+    ids=lambda e: e.name,
+)
+def test_friction_and_load_are_no_gear(lever: Robot, lacks: Effect) -> None:
+    """Both change the torque in the gear, and so its deflection; the gear's own law is right."""
+    found = diagnosed(lever, lacks)
+    gears = {"backlash", "joint_stiffness", "nonlinear_stiffness", "piecewise_stiffness"}
+    assert found.causes
+    assert not {c.effect for c in found.causes} & gears
