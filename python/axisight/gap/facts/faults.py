@@ -50,6 +50,7 @@ MEANINGS: dict[str, str] = {
     "axes_swapped": "a column holds the channel of another axis",
     "sign_flipped": "a channel has the wrong sign",
     "time_shifted": "channels are shifted in time against one another",
+    "stopped_following": "an axis stops following its target, as if its motor were off",
     "axis_delayed": "one axis is late against the others or its reference",
     "position_in_degrees": "a position is in degrees instead of rad",
     "position_in_revolutions": "a position is in revolutions instead of rad",
