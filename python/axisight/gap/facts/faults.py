@@ -72,6 +72,7 @@ MEANINGS: dict[str, str] = {
     "torque_off_control_law": "a torque is not what the controller of the robot file commands",
     "gravity_flipped": "gravity in the robot file has the wrong sign",
     "torque_without_gravity": "the torque was logged without the share that holds the arm against gravity",
+    "range_passed": "positions or targets lie beyond the range of a joint that the model file states",
     "begins_elsewhere": "all logs begin away from where the simulation begins",
     "begins_in_motion": "a log for a closed-loop simulation begins in motion",
     "position_offset": "positions count from another zero than the robot's",

@@ -11,6 +11,7 @@ from axisight.gap.gate.by_controller.follows_target import LATE_S
 from axisight.logs import Log
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 def check_stopped_following(log: Log) -> list[Finding]:
@@ -70,7 +71,7 @@ def _stopped_at(position: Array, target: Array, step_s: float) -> float | None:
     return float(last * length * step_s) if over and mostly else None
 
 
-def _stretches(position: Array, target: Array, length: int) -> tuple[Array, Array, Array]:
+def _stretches(position: Array, target: Array, length: int) -> tuple[Array, Mask, Mask]:
     """Return three properties of each stretch of ``length`` samples, (n_stretches,) each.
 
     - The mean square of position minus target, relative to that of the target, both without their means.
