@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import effect_info
 from axisight.gap.facts.axis_names import hides_all
 from axisight.gap.facts.compared_quantity import torque_of
 from axisight.gap.facts.result import Gap
@@ -68,7 +69,7 @@ def carried_over(
     - ``removed``: share of the validation residual above noise that the causes remove; None if unknown.
     - ``differentiated``: whether torques are predicted from differentiated positions. Their noise lies in the band
       that is compared, so that no average over the log removes it.
-    - ``gears``: errors of gears. Causes that remove them need not shrink the gap, which motors may not show.
+    - ``gears``: errors of gears. Causes of one gear that remove its errors need not shrink a gap near the floor.
     - ``stepped`` (n_axes,): axes whose noise comes from encoder steps; none by default.
     """
     withdrawn = None
@@ -84,11 +85,9 @@ def carried_over(
         return _nothing(conclusion)
     elif conclusion.causes:
         withdrawn = _no_fall(stages, gap, names, settings, stepped, labels)
-        if (
-            withdrawn is not None
-            and withdrawn.why in ("fall", "part")
-            and _mend_gears(gears, settings)
-        ):
+        little = withdrawn is not None and withdrawn.why in ("fall", "part")
+        near = gap.after <= _FAR * gap.floor
+        if little and near and _mend_gears(conclusion, gears, settings):
             withdrawn = None
         if withdrawn is None and bent >= BENT:
             withdrawn = Withdrawal(
@@ -107,11 +106,15 @@ def carried_over(
     )
 
 
-def _mend_gears(gears: GearErrors | None, settings: Settings) -> bool:
-    """Whether causes remove the errors of gears that both encoders show."""
+def _mend_gears(conclusion: Conclusion, gears: GearErrors | None, settings: Settings) -> bool:
+    """Whether all causes are of one gear, and remove its errors that both encoders show."""
     if gears is None or gears.before <= settings.significance:
         return False
-    return gears.before**2 - gears.after**2 >= _ENOUGH * (gears.before**2 - 1.0)
+    of_gear = all(
+        c.axis == gears.axis and effect_info(c.effect).acts == "transmission"
+        for c in conclusion.causes
+    )
+    return of_gear and gears.before**2 - gears.after**2 >= _ENOUGH * (gears.before**2 - 1.0)
 
 
 def _advice(withdrawn: Withdrawal) -> str:
