@@ -49,12 +49,14 @@ class Robot:
         self._torque_constants: tuple[float | None, ...] = (None,) * core.n_axes
         self._states_pose = True
         self._imported_from: Path | None = None
+        self._joint_ranges: tuple[tuple[float, float] | None, ...] = (None,) * core.n_axes
 
     def _with_core(self, core: _core.Robot) -> Robot:
         """Return a robot with another core and what the core does not hold."""
         out = Robot(core)
         out._torque_constants = self._torque_constants
         out._states_pose = self._states_pose
+        out._joint_ranges = self._joint_ranges
         return out
 
     @classmethod
@@ -318,10 +320,29 @@ class Robot:
         """The model file whose import this robot is, with nothing added or changed since; else None."""
         return self._imported_from
 
-    def as_imported(self, source: Path | None, *, states_pose: bool) -> Robot:
-        """Return the same robot with its `imported_from` and `states_operating_point`."""
+    @property
+    def joint_ranges(self) -> tuple[tuple[float, float] | None, ...]:
+        """Smallest and largest angle of each driven joint [rad or m]; None where the model file states none.
+
+        A robot file states none. No simulation stops at them.
+        """
+        return self._joint_ranges
+
+    def as_imported(
+        self,
+        source: Path | None,
+        *,
+        states_pose: bool,
+        joint_ranges: Sequence[tuple[float, float] | None] | None = None,
+    ) -> Robot:
+        """Return the same robot with its `imported_from`, `states_operating_point` and `joint_ranges`.
+
+        Without ``joint_ranges`` the robot keeps its own.
+        """
         out = self._with_core(self.core)
         out._imported_from, out._states_pose = source, states_pose
+        if joint_ranges is not None:
+            out._joint_ranges = tuple(joint_ranges)
         return out
 
     def with_controller_speed(self, factor: float) -> Robot:

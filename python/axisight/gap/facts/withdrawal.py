@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Contradiction = Literal["noise", "loud", "axis", "refit", "part", "fall", "bent", "none"]
+Contradiction = Literal["noise", "loud", "axis", "refit", "part", "fall", "bent", "none", "gear"]
 """What the validation logs contradict.
 
 | value | meaning |
@@ -17,6 +17,7 @@ Contradiction = Literal["noise", "loud", "axis", "refit", "part", "fall", "bent"
 | ``part`` | the causes remove a part of the gap, too little to be all |
 | ``fall`` | the causes hardly remove anything |
 | ``bent`` | the causes need the simulator's own parameters at the edge of their tolerance |
+| ``gear`` | both encoders contradict a gear of the simulator, and no cause is found |
 | ``none`` | no effect is missing on the estimation logs, but the validation logs have a gap |
 """
 
@@ -28,7 +29,7 @@ class Withdrawal:
     ``before``, ``after`` and ``floor``: gap on the validation logs [1] without and with the causes, and of
     noise alone; of one log where ``log`` is given, of one axis (from 1) where ``axis`` is. ``causes``:
     labels of what is withdrawn. ``share``: of own parameters at the edge of their tolerance [1], where
-    ``why`` is ``"bent"``.
+    ``why`` is ``"bent"``; where it is ``"gear"``, the error of the gear in standard deviations.
     """
 
     why: Contradiction

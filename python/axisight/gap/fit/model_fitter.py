@@ -22,9 +22,12 @@ from axisight.fitting import (
 )
 from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis, NormalEquations
+from axisight.gap.fit.gear_rows import GearRows, fit_loss, gear_rows
+from axisight.gap.fit.held_out import linear_step
 from axisight.gap.fit.rank_deficiency import deviations_seen
 from axisight.gap.fit.time_limit import TimeLimit
 from axisight.gap.fit.work_count import WorkCount
+from axisight.gap.simulator.gear_readings import GearReadings
 from axisight.gap.simulator.natural_sizes import NaturalSizes
 from axisight.gap.simulator.own_parameters import for_core
 from axisight.gap.simulator.tolerances import spring_changes, tolerance_of
@@ -69,6 +72,7 @@ class ModelFitter(ABC):
         self.time_limit = TimeLimit.none()
         self.tolerances = tolerances
         self.natural: NaturalSizes | None = None
+        self.gears: GearReadings | None = None
         self.own = [
             robot_parameter(robot, name, relative_tolerance=tolerance)
             for name, value in robot_parameters(robot).items()
@@ -135,6 +139,7 @@ class ModelFitter(ABC):
     def part(self, logs: Sequence[int]) -> ModelFitter:
         """Return a copy for some of the logs, by their numbers; both share one cancellation."""
         other = copy(self)
+        other.gears = None if self.gears is None else self.gears.part(logs)
         other._keep(logs)
         return other
 
@@ -259,7 +264,56 @@ class ModelFitter(ABC):
         if isinstance(result, Diverged):
             return result
         self.work.fit(result.iterations, result.evaluations)
-        return _fitted_model(result, setup, list(free), renewed=renewed, counted=self.counted())
+        found = _fitted_model(result, setup, list(free), renewed=renewed, counted=self.counted())
+        if self.gears is None:
+            return found
+        return self._continued(
+            found, self._gear_rows(found, setup, result.theta), setup, options, near
+        )
+
+    def _continued(
+        self,
+        found: FittedModel,
+        rows: GearRows,
+        setup: _Setup,
+        options: FitOptions,
+        near: _core.Courses | None,
+    ) -> FittedModel:
+        """Return a fit with the rows of gears, continued while they promise a gain: the core fits without them."""
+        best = rows.added_to_fit(found)
+        for _ in range(options.max_iterations):
+            step = linear_step(best)
+            if rows.fall(step) < options.loss_tolerance * best.total:
+                break
+            moved = _moved(setup, best, step)
+            still = replace(options, max_iterations=0)
+            result = self.solve(*self._for_core(moved), still, moved.warm, near)
+            if isinstance(result, Diverged):
+                break
+            self.work.fit(1, result.evaluations)
+            there = _fitted_model(
+                result, moved, best.free, renewed=best.renewed, counted=self.counted()
+            )
+            next_rows = self._gear_rows(there, moved, result.theta)
+            there = next_rows.added_to_fit(there)
+            if not fit_loss(there) < fit_loss(best):
+                break
+            best, rows = replace(there, status=best.status), next_rows
+        return best
+
+    def _gear_rows(self, at: NormalEquations, setup: _Setup, theta: Array) -> GearRows:
+        """Return the rows of gears at the values ``theta`` (n_parameters,) of all parameters of a fit."""
+        assert self.gears is not None
+        own: dict[str, float] = {}
+        effects = list(setup.effects)
+        steps: dict[tuple[int | None, str], float] = {}
+        for p, value in zip(setup.parameters, theta.tolist(), strict=True):
+            if p.effect is None:
+                own[p.name] = value
+            else:
+                effects[p.effect] = effects[p.effect].with_values({p.name: value})
+            steps[p.effect, p.name] = p.scale if value + p.scale <= p.upper else -p.scale
+        return gear_rows(self.gears, at.parameters, own, effects, [steps[n] for n in at.parameters])
 
     def evaluate(
         self,
@@ -312,7 +366,17 @@ class ModelFitter(ABC):
         if isinstance(result, Diverged):
             return result
         self.work.linearization()
-        return replace(_linearized(result, setup), jacobian=tuple(result.columns))
+        found = replace(_linearized(result, setup), jacobian=tuple(result.columns))
+        if self.gears is None:
+            return found
+        blocks = np.array(result.blocks, dtype=np.int64).reshape(-1, 4)
+        return self._gear_rows(found, setup, result.theta).added(found, blocks[:, 0], blocks[:, 1])
+
+    def lasting(self, option: Hypothesis) -> bool:
+        """Whether the sensitivities of a candidate to this error are all in its columns, which later models reuse."""
+        return self.gears is None or not any(
+            self.gears.feels(name, option.effect) for name in option.free
+        )
 
     def replaced(self, free: Sequence[Hypothesis]) -> set[str]:
         """Return the robot's parameters that the effects replace."""
@@ -432,6 +496,18 @@ def _same_quantity(robot: Robot, effect: Effect) -> str | None:
 
 def _names(setup: _Setup) -> list[tuple[int | None, str]]:
     return [(p.effect, p.name) for p in setup.parameters]
+
+
+def _moved(setup: _Setup, found: FittedModel, step: Array) -> _Setup:
+    """Return the setup of a fit with start values a step (n_free,) from where it ended, within the bounds."""
+    by = dict(zip(found.parameters, step.tolist(), strict=True))
+    parameters = []
+    for p, key in zip(setup.parameters, _names(setup), strict=True):
+        place, name = key
+        values = found.robot_values if place is None else found.effects[place].parameters or {}
+        at = values[name] + by.get(key, 0.0)
+        parameters.append(replace(p, initial=min(max(at, p.lower), p.upper)))
+    return replace(setup, parameters=parameters)
 
 
 def _linearized(result: _core.FitResult | _core.Linearization, setup: _Setup) -> NormalEquations:

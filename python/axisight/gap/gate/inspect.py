@@ -12,6 +12,7 @@ from axisight.gap.facts.faults import Finding, RefusedInputError, check_names, f
 from axisight.gap.gate.beyond_a_turn import check_turns
 from axisight.gap.gate.by_controller.closed_loop import check_closed_loop
 from axisight.gap.gate.by_controller.follows_target import check_follows_target
+from axisight.gap.gate.by_controller.stopped_following import check_stopped_following
 from axisight.gap.gate.by_dynamics.inverse_checks import check_inverse
 from axisight.gap.gate.by_dynamics.turned_axes import check_turned_axes
 from axisight.gap.gate.copies import check_copies
@@ -68,6 +69,7 @@ def check_by_targets(
     found += _of_each(check_log_alone, logs)
     found += check_copies(estimation, validation)
     found += [f for log in logs for f in check_follows_target(robot, log)]
+    found += [f for log in logs for f in check_stopped_following(log)]
     found += [f for log in logs for f in check_turns(robot, log)]
     return tuple(flagged(found, despite))
 
@@ -128,7 +130,8 @@ def _machine(robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding
 
 
 def _logs(_robot: Robot, estimation: _Logs, validation: _Logs) -> list[Finding]:
-    alone = _of_each(check_log_alone, [*estimation, *validation])
+    logs = [*estimation, *validation]
+    alone = [*_of_each(check_log_alone, logs), *_of_each(check_stopped_following, logs)]
     return [*alone, *check_copies(estimation, validation)]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from axisight.gap.facts.faults import Finding
+from axisight.gap.gate.joint_ranges import check_ranges
 from axisight.logs import Log
 from axisight.logs.grid import RATE_TOLERANCE
 from axisight.logs.mean_rate import whole_rate
@@ -19,9 +20,10 @@ _DIFFERS = "sample_time_differs"
 
 
 def check_machine(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
-    """Return findings about axes, sample times and gear ratios."""
+    """Return findings about axes, sample times, gear ratios and ranges of joints."""
     out = _gears(robot)
     for log in logs:
+        out += check_ranges(robot, log)
         if log.n_axes != robot.n_axes:
             message = (
                 f"expected {robot.n_axes} axes as in the robot, got {log.n_axes}. Use the robot file of this "

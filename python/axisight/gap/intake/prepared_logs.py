@@ -18,6 +18,7 @@ from axisight.gap.intake import user_simulator
 from axisight.gap.intake.start_of_logs import from_rest, loops_of
 from axisight.gap.measure.gear_deflections import gears_seen, gears_that_differ
 from axisight.gap.prepare.currents import Nominal, in_torques
+from axisight.gap.prepare.joint_encoders import without_unlike_encoders
 from axisight.gap.prepare.position_targets import Commanded, with_commands
 from axisight.gap.prepare.reconstructed_references import SAYS, with_references
 from axisight.gap.prepare.start_elsewhere import begins_elsewhere, compared_later
@@ -173,9 +174,10 @@ def behind_gate(
             'simulated: expected logs of torques beside logs of a simulator, got currents of scale = "unknown"'
         )
     begun = from_rest(robot, read.estimation, read.validation, simulated, despite)
-    logs, n = [*begun.estimation, *begun.validation], len(estimation)
+    n = len(estimation)
+    logs, aside = without_unlike_encoders(robot, [*begun.estimation, *begun.validation])
     robot = as_speed_loop(robot, logs)
-    found, beside = (*slowed, *begun.findings), begun.simulated
+    found, beside = (*slowed, *begun.findings, *aside), begun.simulated
     commanded = with_commands(robot, logs)
     silent: tuple[int, ...] = ()
     if commanded is not None:

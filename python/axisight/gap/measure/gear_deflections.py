@@ -3,14 +3,56 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
 from axisight.gap.facts.faults import Finding
+from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.simulator_variant import Variant
 from axisight.gap.signals.both_encoders import Swing, swings
 from axisight.gap.signals.noise import white_std
+from axisight.gap.simulator.gear_readings import gear_readings
 from axisight.logs import Log
 from axisight.robot import Robot
+
+
+@dataclass(frozen=True)
+class GearErrors:
+    """Errors of a simulator's gears against what both encoders show on some logs, the axis (from 1) with most.
+
+    ``before``, ``after``: rms of the readings' errors with the re-fitted simulator and with the causes, in standard
+    deviations [1].
+    """
+
+    axis: int
+    before: float
+    after: float
+
+
+def gear_errors(
+    robot: Robot, logs: Sequence[Log], model_error: float, refitted: Variant, causes: Variant
+) -> GearErrors | None:
+    """Return the errors of gears on logs; None if no log shows an elastic gear from both sides."""
+    readings = gear_readings(robot, logs, model_error)
+    if readings is None:
+        return None
+    before, after = (readings.residual(v.robot_values, v.effects) for v in (refitted, causes))
+    places = readings.axis
+    rms = {int(i): float(np.sqrt(np.mean(before[places == i] ** 2))) for i in np.unique(places)}
+    worst = max(rms, key=rms.__getitem__)
+    left = float(np.sqrt(np.mean(after[places == worst] ** 2)))
+    return GearErrors(worst + 1, rms[worst], left)
+
+
+def gear_check(errors: GearErrors | None, settings: Settings) -> tuple[str, ...]:
+    """Return a sentence about a gear whose errors are significant without the causes; else nothing."""
+    if errors is None or errors.before <= settings.significance:
+        return ()
+    return (
+        f"Both encoders contradict the gear of axis {errors.axis} by {errors.before:.1f} standard deviations without "
+        f"the causes and by {errors.after:.1f} with them, on validation logs.",
+    )
 
 
 def gears_seen(robot: Robot, logs: Sequence[Log]) -> tuple[str, ...]:
@@ -51,10 +93,7 @@ def _found(robot: Robot, logs: Sequence[Log]) -> dict[int, Swing]:
     for axis in robot.axis_numbers():
         seen = [swing for row in each if (swing := row[axis - 1]) is not None]
         if seen:
-            measured, simulated, play = np.median(
-                [(s.measured_rad, s.simulated_rad, s.play_rad) for s in seen], axis=0
-            )
-            out[axis] = Swing(float(measured), float(simulated), float(play))
+            out[axis] = Swing(*map(float, np.median([astuple(s) for s in seen], axis=0)))
     return out
 
 

@@ -192,7 +192,8 @@ class Screening:
         """Return the normal equations of the model with each candidate of a group; None for those that diverge."""
         found = self._run(group)
         for option, fitted in zip(group, found, strict=True):
-            if fitted is not None and self.idle(option):
+            lasting = self.idle(option) and self.fitter.lasting(option)
+            if fitted is not None and lasting:
                 self.kept.keep(option, fitted)
         return found
 

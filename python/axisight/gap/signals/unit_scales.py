@@ -6,7 +6,7 @@ import math
 
 # Largest relative difference from a unit's factor: ratios of filtered signals are that exact, and no other unit
 # is as near.
-_TOLERANCE = 0.04
+TOLERANCE = 0.04
 # Degrees per radian.
 _DEG = 180.0 / math.pi
 
@@ -40,10 +40,10 @@ def scale_name(field: str, factor: float, gear_ratio: float) -> str:
     factor, ratio = abs(factor), abs(gear_ratio)
     tables = {"position": _POSITION, "velocity_ref": _VELOCITY_REF, "torque": _TORQUE}
     for name, known in tables[field].items():
-        if abs(factor / known - 1.0) < _TOLERANCE:
+        if abs(factor / known - 1.0) < TOLERANCE:
             return name
     joint_side = 1.0 / ratio if field == "torque" else ratio
-    if abs(math.log(joint_side)) > 0.1 and abs(factor / joint_side - 1.0) < _TOLERANCE:
+    if abs(math.log(joint_side)) > 0.1 and abs(factor / joint_side - 1.0) < TOLERANCE:
         return f"{field}_joint_side"
     if field == "position" and _is_count(factor):
         return "position_in_counts"
@@ -58,4 +58,4 @@ def _is_count(factor: float) -> bool:
         return False
     thousands = per_turn / 1000.0
     near = abs(thousands - round(thousands)) < 0.01 * thousands and thousands < 50
-    return abs(2.0 ** (bits - round(bits)) - 1.0) < _TOLERANCE / 2 or near
+    return abs(2.0 ** (bits - round(bits)) - 1.0) < TOLERANCE / 2 or near

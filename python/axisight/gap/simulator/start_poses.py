@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.gap.signals.both_encoders import deflections_at_start
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -19,16 +20,20 @@ OFFSET_RAD = 0.02
 # Iterations for the start angle. Gravity deflection changes little with the pose: each step leaves 1 % of the
 # error.
 _STEPS = 3
-SAYS = "each log is simulated from the pose where it begins: poses differ, or the robot file states none"
+SAYS = (
+    "each log is simulated from the pose where it begins: poses differ, the robot file states none, or joint "
+    "encoders show that joints do not stand where their motors do"
+)
 
 
 def at_their_poses(robot: Robot, logs: Sequence[Log]) -> list[Log]:
     """Return logs with the joint angles where their simulations start, if that is not the operating point.
 
     It is not where logs start at different poses, or away from an operating point that the robot does not state.
-    All logs at one pose away from a stated operating point are a finding of the gate instead. Motors count as at
-    rest at the first sample. Logs stay unchanged if the robot has no controller: it is not simulated along them.
-    A log with a run-up keeps the start that this has.
+    All logs at one pose away from a stated operating point are a finding of the gate instead. Nor is it where
+    encoders of motor and joint show a gear that is deflected further at the start than the simulator's. Motors count
+    as at rest at the first sample. Logs stay unchanged if the robot has no controller: it is not simulated along
+    them. A log with a run-up keeps the start that this has.
     """
     if robot.controller_kind == "none" or any(log.n_axes != robot.n_axes for log in logs):
         # The gate refuses logs of another robot by name.
@@ -37,14 +42,27 @@ def at_their_poses(robot: Robot, logs: Sequence[Log]) -> list[Log]:
     if begins and not robot.states_operating_point:
         begins.append(robot.operating_point / robot.gear_ratio)
     apart = np.ptp(begins, axis=0) * np.abs(robot.gear_ratio) if begins else np.zeros(1)
-    if not np.any(apart > OFFSET_RAD):
-        return list(logs)
+    elsewhere = bool(np.any(apart > OFFSET_RAD))
+    deflected = deflections_at_start(logs, robot)
     return [
-        log
-        if log.run_up is not None
-        else replace(log, start_rad=start_of(robot, log.position_rad[0]))
-        for log in logs
+        log if log.run_up is not None else _at_its_pose(robot, log, elsewhere, bent)
+        for log, bent in zip(logs, deflected, strict=True)
     ]
+
+
+def _at_its_pose(robot: Robot, log: Log, elsewhere: bool, deflected_rad: Array) -> Log:
+    """Return a log with the joint angles where its simulation starts.
+
+    ``elsewhere``: not at the operating point; ``deflected_rad`` (n_axes,): deflection of the gears at the first sample,
+    NaN where it is unknown.
+    """
+    angle = start_of(robot, log.position_rad[0]) if elsewhere else np.array(robot.operating_point)
+    motor = robot.equilibrium(angle.tolist())["motor_angle_rad"].values
+    further = deflected_rad - (motor * robot.gear_ratio - angle)
+    behind = np.abs(further) > OFFSET_RAD
+    if not elsewhere and not behind.any():
+        return log
+    return replace(log, start_rad=np.where(behind, angle - further, angle))
 
 
 def start_of(robot: Robot, position_rad: Array) -> Array:

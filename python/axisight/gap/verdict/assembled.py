@@ -27,6 +27,7 @@ from axisight.gap.measure.chatter import chance_check
 from axisight.gap.measure.detection_limits import detection_limits
 from axisight.gap.measure.gap_beyond_torque import beyond_torque
 from axisight.gap.measure.gap_figures import gap_figures, stage
+from axisight.gap.measure.gear_deflections import GearErrors, gear_check, gear_errors
 from axisight.gap.measure.motion_errors import motion_errors, velocity_from
 from axisight.gap.measure.reach import Reach
 from axisight.gap.measure.where import (
@@ -77,7 +78,8 @@ def assembled(
     gap = replace(gap, motion=_motion(view, held_logs, seen, noted))
     names = [log.name for log in held_logs]
     nominal, tolerances = nominal_values(robot), view.fitter.tolerances
-    conclusion, reductions = _concluded(view, held_logs, seen, settings)
+    gears = _gear_errors(view, held_logs, seen)
+    conclusion, reductions = _concluded(view, held_logs, seen, settings, gears)
     conclusion = with_axes_agreed(
         conclusion, reach.judged, gap, settings, own_residual=found.adds_up
     )
@@ -131,6 +133,7 @@ def assembled(
             *conclusion.checks,
             *chance_check(reach.stages, reach.judged),
             *open_check(reach.stages),
+            *gear_check(gears, settings),
             *view.remarks(),
         ),
         axes=conclusion.axes,
@@ -189,7 +192,11 @@ def _limits(limits: Sequence[DetectionLimit], conclusion: Conclusion) -> tuple[D
 
 
 def _concluded(
-    view: View, held_logs: Sequence[Log], seen: Validated, settings: Settings
+    view: View,
+    held_logs: Sequence[Log],
+    seen: Validated,
+    settings: Settings,
+    gears: GearErrors | None,
 ) -> tuple[Conclusion, list[Interval]]:
     """Return the conclusion after validation, and by how much each cause reduces the gap there."""
     found, reach = seen.found, seen.reach
@@ -209,6 +216,7 @@ def _concluded(
         steps > 0,
         differentiated=view.mode == "inverse_dynamics",
         refuted=float(np.min(found.noise)),
+        gears=gears,
     )
     measured = [view.measured(log) for log in held_logs]
     conclusion, of_steps = with_coarse_encoders(
@@ -221,6 +229,15 @@ def _concluded(
     )
     conclusion, unfelt = with_controllers_shown(conclusion, view)
     return conclusion, [*reach.reductions, *of_steps, *unfelt]
+
+
+def _gear_errors(view: View, held_logs: Sequence[Log], seen: Validated) -> GearErrors | None:
+    """Return the errors of gears on the validation logs, if gears take part in the comparison."""
+    if view.fitter.gears is None:
+        return None
+    refitted = Variant(seen.found.baseline.robot_values)
+    error = view.settings.model_error
+    return gear_errors(view.robot, held_logs, error, refitted, seen.reach.simulator)
 
 
 def _places(

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import effect_info
 from axisight.gap.facts.axis_names import hides_all
 from axisight.gap.facts.compared_quantity import torque_of
 from axisight.gap.facts.result import Gap
@@ -17,6 +18,7 @@ from axisight.gap.facts.wording import listed, percent
 from axisight.gap.fit.tolerance_edges import BENT
 from axisight.gap.measure.by_axis import OwnAxes
 from axisight.gap.measure.gap_figures import Stage, Stages
+from axisight.gap.measure.gear_deflections import GearErrors
 from axisight.gap.verdict.conclusion import Conclusion, advice_unknown
 
 Array = NDArray[np.float64]
@@ -51,6 +53,7 @@ def carried_over(
     *,
     differentiated: bool = False,
     refuted: float = 1.0,
+    gears: GearErrors | None = None,
 ) -> Conclusion:
     """Return the conclusion, or *unknown* with the reason where the validation logs contradict it.
 
@@ -58,7 +61,7 @@ def carried_over(
     |---|---|---|
     | causes | they do not shrink the gap there | *unknown* |
     | causes of the size of noise | they do not shrink it, and no log stands above the floor | *none* |
-    | *none* | a log stands above the floor | *unknown* |
+    | *none* | a log stands above the floor, or both encoders contradict a gear | *unknown* |
     | anything | the estimated noise is larger than a gap that is seen | *unknown* |
     | anything | noise of differentiated positions hides any gap | *unknown* |
 
@@ -69,6 +72,7 @@ def carried_over(
       that is compared, so that no average over the log removes it.
     - ``refuted``: factor by which the model lowered the noise of the estimation logs [1]. Noise as large as the torque
       is no less doubtful for that.
+    - ``gears``: errors of gears. Causes of one gear that remove its errors need not shrink a gap near the floor.
     - ``stepped`` (n_axes,): axes whose noise comes from encoder steps; none by default.
     """
     withdrawn = None
@@ -84,12 +88,18 @@ def carried_over(
         return _nothing(conclusion)
     elif conclusion.causes:
         withdrawn = _no_fall(stages, gap, names, settings, stepped, labels)
+        little = withdrawn is not None and withdrawn.why in ("fall", "part")
+        near = gap.after <= _FAR * gap.floor
+        if little and near and _mend_gears(conclusion, gears, settings):
+            withdrawn = None
         if withdrawn is None and bent >= BENT:
             withdrawn = Withdrawal(
                 "bent", gap.before, gap.after, gap.floor, None, None, labels, bent
             )
     elif conclusion.verdict == "none":
         withdrawn = _above_floor(stages, names)
+        if withdrawn is None and gears is not None and gears.after > settings.significance:
+            withdrawn = Withdrawal("gear", axis=gears.axis, share=gears.after)
     if withdrawn is None:
         return conclusion
     return replace(
@@ -97,6 +107,17 @@ def carried_over(
         next_experiment=_advice(withdrawn),
         withdrawn=withdrawn,
     )
+
+
+def _mend_gears(conclusion: Conclusion, gears: GearErrors | None, settings: Settings) -> bool:
+    """Whether all causes are of one gear, and remove its errors that both encoders show."""
+    if gears is None or gears.before <= settings.significance:
+        return False
+    of_gear = all(
+        c.axis == gears.axis and effect_info(c.effect).acts == "transmission"
+        for c in conclusion.causes
+    )
+    return of_gear and gears.before**2 - gears.after**2 >= _ENOUGH * (gears.before**2 - 1.0)
 
 
 def _advice(withdrawn: Withdrawal) -> str:

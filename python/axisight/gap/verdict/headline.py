@@ -350,6 +350,8 @@ def _unknown(facts: Facts) -> list[str]:
     if facts.stopped is not None:
         # Nobody knows yet what explains the rest.
         return [*out, "" if facts.causes else _refitted(facts), _contradiction(facts)]
+    if facts.withdrawn is not None and facts.withdrawn.why == "gear":
+        return [*out, _contradiction(facts)]
     return [*out, _gap_left(facts), _contradiction(facts)]
 
 
@@ -453,6 +455,11 @@ def _contradiction(facts: Facts) -> str:
         if not math.isfinite(seen.after):
             left = f"the simulation broke off{there}"
         return f"The estimation logs lack no effect, but that does not carry over to the validation logs: {left}."
+    if seen.why == "gear":
+        return (
+            f"Encoders of motor and joint show that the gear of axis {seen.axis} deflects otherwise than the "
+            f"simulator's, by {seen.share:.1f} standard deviations. No known effect explains it."
+        )
     if seen.why == "bent":
         return (
             f"{_tried(seen, facts.n_axes)} would explain it only with {100 * seen.share:.0f} % of the simulator's "

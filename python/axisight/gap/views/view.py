@@ -24,6 +24,7 @@ from axisight.gap.hypotheses.ripple_orders import Turning
 from axisight.gap.prepare.currents import unknown_axes
 from axisight.gap.search.state import SearchState
 from axisight.gap.signals.noise import Floor
+from axisight.gap.simulator.gear_readings import gear_readings
 from axisight.gap.simulator.natural_sizes import NaturalSizes
 from axisight.gap.simulator.own_parameters import absorbed, unknown_constants
 from axisight.logs import Log
@@ -66,8 +67,10 @@ class View(ABC):
         return self.cutoff_hz
 
     def __post_init__(self) -> None:
-        """Give the fitter the natural sizes of effects and the unknown torque constants of this robot."""
+        """Give the fitter the natural sizes of effects, the readings of gears and the unknown torque constants."""
         self.fitter.natural = NaturalSizes(self.robot, self.logs)
+        if self.mode == "closed_loop":
+            self.fitter.gears = gear_readings(self.robot, self.logs, self.settings.model_error)
         self.fitter.own += unknown_constants(self.robot, unknown_axes(self.logs))
         self._turned: Sequence[Sequence[Turning]] = ()
 

@@ -10,6 +10,7 @@ from axisight import Log, Settings
 from axisight.effects import Effect
 from axisight.gap.facts.result import AxisVerdict, Candidate, Interval
 from axisight.gap.measure.gap_figures import Stages, gap_figures, stage
+from axisight.gap.measure.gear_deflections import GearErrors
 from axisight.gap.verdict.carry_over import carried_over
 from axisight.gap.verdict.conclusion import Conclusion, NamedCause
 
@@ -45,7 +46,7 @@ def named(effect: str = "coulomb_friction") -> Conclusion:
         p_unknown=0.01,
         axes=(AxisVerdict(1, "explained", 5.0, 0.99, (0,)),),
         checks=(),
-        effects=(Effect(effect, 1, {"coulomb_nm": 1.0}),),
+        effects=(Effect("coulomb_friction", 1, {"coulomb_nm": 1.0}),),
     )
 
 
@@ -75,6 +76,29 @@ def test_causes_that_leave_the_gap_are_withdrawn(after: float, why: str):
     assert (found.withdrawn.why, found.withdrawn.causes) == (why, ("coulomb_friction@1",))
     assert found.withdrawn.after == pytest.approx(after * np.sqrt(2.0), rel=0.05)
     assert all(a.verdict == "unknown" and a.causes == () for a in found.axes)
+
+
+def test_causes_of_a_gear_that_both_encoders_show_need_not_shrink_the_gap():
+    mended = GearErrors(axis=1, before=9.0, after=0.8)
+    gear, seen = named("joint_stiffness"), stages(0.08, 0.079)
+    gear = replace(gear, effects=())
+    assert judged(gear, seen).verdict == "unknown"
+    assert judged(gear, seen, gears=mended) == gear
+    # Not with other causes, far above the floor, or where the gear stays as wrong as it was.
+    assert judged(named(), seen, gears=mended).verdict == "unknown"
+    assert judged(gear, stages(0.5, 0.45), gears=mended).verdict == "unknown"
+    assert judged(gear, seen, gears=GearErrors(1, 9.0, 8.0)).verdict == "unknown"
+    assert judged(gear, seen, gears=GearErrors(2, 9.0, 0.8)).verdict == "unknown"
+
+
+def test_none_is_unknown_where_both_encoders_contradict_a_gear():
+    none = replace(named(), verdict="none", causes=(), effects=())
+    floor = stages(0.05, 0.05)
+    assert judged(none, floor, gears=GearErrors(1, 2.0, 2.0)) == none
+    found = judged(none, floor, gears=GearErrors(1, 9.0, 9.0))
+    assert found.verdict == "unknown"
+    assert found.withdrawn is not None
+    assert (found.withdrawn.why, found.withdrawn.axis, found.withdrawn.share) == ("gear", 1, 9.0)
 
 
 def test_a_withdrawn_cause_is_the_likeliest_alternative():

@@ -14,7 +14,7 @@ from axisight.robot import Robot
 Array = NDArray[np.float64]
 
 # Largest delay of a position after its target [s]: loops may be soft.
-_LATE_S = 0.3
+LATE_S = 0.3
 
 
 def check_follows_target(robot: Robot, log: Log) -> list[Finding]:
@@ -22,7 +22,7 @@ def check_follows_target(robot: Robot, log: Log) -> list[Finding]:
     if log.position_ref_rad is None or log.n_axes != robot.n_axes:
         return []
     position, target = log.position_rad, log.position_ref_rad
-    lags = range(min(round(_LATE_S / log.sample_time_s), log.n_samples // 2) + 1)
+    lags = range(min(round(LATE_S / log.sample_time_s), log.n_samples // 2) + 1)
     left, ratio = zip(*(_followed(position, target, lag) for lag in lags), strict=True)
     least = np.min(left, axis=0)
     # Correlation of each position with its own target, at the lag where it is largest.
