@@ -17,6 +17,7 @@ from axisight.gap.fit.sensitivity import Sensitivity
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.likelihood import FORMULA_ERROR
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
+from axisight.gap.screening.free_bodies import FreeBodies
 
 Array = NDArray[np.float64]
 
@@ -47,6 +48,7 @@ class SearchState:
     - ``steps``: what each move changed.
     - ``number``: the round that is under way, from 1.
     - ``stopped``: where the time limit ended the search; None if it ended by itself.
+    - ``bodies``: the bodies of the arm, where they are not trusted.
     - ``adds_up``: whether the errors of the axes add up; ``by_axis``: whether causes explain single axes, not the arm.
     """
 
@@ -62,6 +64,7 @@ class SearchState:
     stopped: Stop | None = None
     adds_up: bool = False
     by_axis: bool = False
+    bodies: FreeBodies | None = None
 
     @property
     def accepted(self) -> list[tuple[RankedHypothesis, AxisPosterior]]:
