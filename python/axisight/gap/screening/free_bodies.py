@@ -66,9 +66,9 @@ class FreeBodies:
     def allow(self, one: FittedHypothesis, model: FittedModel) -> bool:
         """Whether an effect beside a model may be a cause, whatever the bodies of the arm.
 
-        Beside free bodies, it explains enough of what is left on its axis. An effect of the arm, or one that every
-        machine has, may stand in the place of the bodies: it explains as much as they do together. A load does, and one
-        link of several that are off does not.
+        Beside free bodies, it explains enough of what is left on its axis. An effect of the arm, a constant torque, or
+        what every machine has may stand in the place of the bodies: it explains as much as they do together. A load
+        does, and one link of several that are off does not.
         """
         if not self.bodies:
             return True
@@ -83,7 +83,7 @@ class FreeBodies:
         effect = one.hypothesis.effect
         of_arm = effect_info(effect.name).acts == "arm"
         axis = None if of_arm or effect.axis is None else effect.axis - 1
-        if of_arm or lacks(self.fitter, effect):
+        if of_arm or of_rigid_bodies(effect.name) or lacks(self.fitter, effect):
             losses = held_out_loss(model), one.held_out, found.held_out()
             before, after, least = (found.weighed(x, axis) for x in losses)
             if before - after >= AS_MUCH * (before - least):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ import pytest
 import rigid_arm
 from axisight import Effect, Log, Robot, Settings
 from axisight.gap.fit.data_blocks import layout_of
+from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.ranking.ordinary_first import unsaid
 from axisight.gap.screening.free_bodies import FreeBodies
 from axisight.gap.screening.ordinary_together import Found, OrdinaryTogether
+from axisight.gap.screening.search_round import fresh
 from axisight.gap.views.inverse_dynamics import InverseView
 
 AXES = range(1, 7)
@@ -119,3 +122,25 @@ def test_a_simulator_with_values_for_each_axis_is_trusted():
     # Without friction, of which the arm states none.
     view = InverseView(rigid_arm.arm(), [logged()], Settings(threads=1))
     assert unsaid(view.fitter) == {"coulomb_friction", "viscous_friction"}
+
+
+def test_no_friction_is_negative_in_total():
+    """In any comparison, a cause takes away no more than the simulator has."""
+    stated = 40.0
+    view = InverseView(bare(stated), [logged()], Settings(threads=1))
+    offered = view.candidates(view.fitter.fit([]), axes=[2])
+    viscous = next(h for h in offered if h.effect.name == "viscous_friction")
+    assert viscous.limits("viscous_nm_s_rad")[0] == -stated
+
+
+def test_a_sure_cause_keeps_its_interval_and_its_place():
+    """No richer law of the same axis takes the place of a cause that holds for any bodies."""
+    sure = Hypothesis(
+        Effect("coulomb_friction", 2), ("coulomb_nm",), sure={"coulomb_nm": (1.0, 2.0)}
+    )
+    model = SimpleNamespace(effects=(sure.effect,), free=(sure,))
+    richer = [Hypothesis(Effect("stribeck_friction", axis), ()) for axis in (2, 3)]
+    assert sure.limits("coulomb_nm") == (1.0, 2.0)
+    assert [h.effect.axis for h in fresh(richer, model, set())] == [3]
+    plain = SimpleNamespace(effects=(sure.effect,), free=(replace(sure, sure={}),))
+    assert [h.effect.axis for h in fresh(richer, plain, set())] == [2, 3]
