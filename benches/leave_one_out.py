@@ -1,13 +1,14 @@
 """One effect at a time withheld from the complete simulator of a real machine: is it named?
 
 Run: python benches/leave_one_out.py DATA [--machine emps kr300 tx40] [--json out.json]
-         [--score FOLDER]
+         [--score FOLDER] [--public FOLDER LOG LOG ...]
 
 DATA holds emps/, kuka_kr300/ and staubli_tx40/ (see real_arms.py). Each machine is identified from
 its estimation logs; then it is diagnosed without friction, complete, and without one effect of
 one axis, each in turn. Prints a table in Markdown. With --score, truths and verdicts go to a folder
 as those of the benchmark do, and `axisight blind score FOLDER/cases --truth FOLDER/truths --verdicts
-FOLDER/verdicts` counts them by its rules.
+FOLDER/verdicts` counts them by its rules. --public takes a public arm instead: the folder that a script of benches/arms
+wrote, and the names of its logs, of which the last is held out.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from real_arms import MACHINES, Machine
+from real_arms import MACHINES, Machine, public
 
 from axisight import Diagnosis, Robot, Settings, diagnose
 from axisight.blind.sealed import SEAL, TRUTH_SCHEMA, seal_of
@@ -228,10 +229,15 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", help="labels of the cases to run")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--score", type=Path, help="folder for truths and verdicts")
+    parser.add_argument("--public", nargs="+", metavar=("FOLDER", "LOG"))
     arguments = parser.parse_args()
     rows: list[Row] = []
-    for name in arguments.machine:
-        machine = MACHINES[name](arguments.data)
+    if arguments.public:
+        folder, *logs = arguments.public
+        machines = [public(Path(folder), logs)]
+    else:
+        machines = [MACHINES[name](arguments.data) for name in arguments.machine]
+    for machine in machines:
         bare = machine.without_friction()
         todo = [
             Case("all friction", bare, "", 0.0, 1.0),

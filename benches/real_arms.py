@@ -1,14 +1,14 @@
 """Three real machines as simulators and logs: EMPS, KUKA KR300, Staubli TX40.
 
 Where the data comes from is in examples/emps and examples/rigid_body; a folder with emps/,
-kuka_kr300/ and staubli_tx40/ is expected.
+kuka_kr300/ and staubli_tx40/ is expected. Public arms come from the folders that the scripts in arms/ write.
 """
 
 from __future__ import annotations
 
 import tempfile
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -147,6 +147,19 @@ def tx40(data: Path) -> Machine:
     whole = _log("motion", 500.0, motor + start / robot.gear_ratio, torque)
     parts = [whole.part(0.0, 2.5), whole.part(2.5, 5.0), whole.part(5.0, 7.5)]
     return Machine("TX40", *_identified(robot, parts[:2], 20.0), parts[:2], parts[2:])
+
+
+def public(folder: Path, names: Sequence[str], cutoff_hz: float = 10.0) -> Machine:
+    """Return a public arm from the folder that a script of ``arms`` wrote, identified on all logs but the last.
+
+    ``names``: the logs, without their ending; the last is held out.
+    """
+    bare = axisight.load_robot(folder / "robot.toml")
+    logs = [
+        axisight.read_log(folder / f"{x}.csv", folder / "columns.toml", robot=bare) for x in names
+    ]
+    robot = bare.with_sample_time(logs[0].sample_time_s)
+    return Machine(folder.name, *_identified(robot, logs[:-1], cutoff_hz), logs[:-1], logs[-1:])
 
 
 MACHINES: dict[str, Callable[[Path], Machine]] = {"emps": emps, "kr300": kr300, "tx40": tx40}

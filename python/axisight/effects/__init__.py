@@ -1,7 +1,7 @@
 """The effects a machine may have and a simulator may lack."""
 
 from axisight.effects.effect import Effect, EffectTuple, core_effects, effect_of_core
-from axisight.effects.stated import on_every_machine
+from axisight.effects.stated import of_rigid_bodies, on_every_machine
 from axisight.effects.table import EffectInfo, EffectParameter, effect_info, effect_table
 from axisight.effects.words import article, noun, phrase, title
 
@@ -16,6 +16,7 @@ __all__ = [
     "effect_of_core",
     "effect_table",
     "noun",
+    "of_rigid_bodies",
     "on_every_machine",
     "phrase",
     "title",

@@ -130,6 +130,9 @@ LINK_GEOMETRY, JOINT_ZERO, BASE_TILT = (
 Parameters: shift in the frame of the link, offset of the zero, angles about x and y.
 """
 
+CONSTANT_TORQUE = "torque_offset"
+"""Constant torque of a motor, beside what its controller commands."""
+
 JOINT_SPRING = ("cable_stiffness", "stiffness_nm_rad", "at_zero_nm")
 """Spring on a joint: effect, its stiffness, its torque where the joint is at zero."""
 
@@ -188,3 +191,11 @@ DEMONSTRATION = Effect("coulomb_friction", 2, {"coulomb_nm": 0.6, "smoothing_rad
 def on_every_machine(name: str) -> bool:
     """Return whether every axis of a machine has an effect, although a model file may leave it out."""
     return name in (VISCOUS_FRICTION, DRY_FRICTION[0], ROTOR)
+
+
+def of_rigid_bodies(name: str) -> bool:
+    """Return whether an effect changes the rigid bodies of an arm, or a constant torque of an axis.
+
+    Least squares free these together with friction and rotors.
+    """
+    return name in (LINK_MASS, LINK_COM, LINK_INERTIA, CONSTANT_TORQUE)

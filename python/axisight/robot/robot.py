@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module, resources
@@ -30,6 +31,9 @@ ControllerKind = Literal[
 ]
 TOLD_POSITIONS: tuple[ControllerKind, ...] = ("pd_position", "cascade_position")
 """Kinds of controllers whose references are positions."""
+
+# The line of a robot file that states the sample time.
+_SAMPLE_TIME = re.compile(r"^sample_time\s*=.*$", re.MULTILINE)
 
 
 class Robot:
@@ -344,6 +348,19 @@ class Robot:
         if joint_ranges is not None:
             out._joint_ranges = tuple(joint_ranges)
         return out
+
+    def with_sample_time(self, sample_time_s: float) -> Robot:
+        """Return the same robot with another sample time [s].
+
+        Raises InputError unless the sample time is positive.
+        """
+        seconds = positive("sample_time_s", sample_time_s)
+        text = _SAMPLE_TIME.sub(f"sample_time = {seconds!r}", self.core.toml, count=1)
+        core = _core.Robot.from_toml(text).with_parameters(self.core.parameters())
+        core = core.with_operating_point(self.operating_point.tolist())
+        if core.velocity_feedforward != self.velocity_feedforward:
+            core = core.with_velocity_feedforward(self.velocity_feedforward)
+        return self._with_core(core.with_effects(core_effects(self.effects)))
 
     def with_controller_speed(self, factor: float) -> Robot:
         """Return the same robot with a control loop ``factor`` [1] times as fast as stated.

@@ -22,6 +22,8 @@ class Hypothesis:
     - ``starts``: further start values, since a fit may end in a local minimum.
     - ``stated``: values of the effect that the simulator already has.
     - ``deflections_rad``: range in which the torques of the logs turn a linear gear, for gear laws.
+    - ``sure``: interval by parameter that holds for any bodies of the arm. It leaves out what the simulator has, and
+      the fit stays in it.
     """
 
     effect: Effect
@@ -31,6 +33,7 @@ class Hypothesis:
     starts: tuple[Mapping[str, float], ...] = ()
     stated: Mapping[str, float] = field(default_factory=dict)
     deflections_rad: tuple[float, float] | None = None
+    sure: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def at(self, values: Mapping[str, float]) -> Hypothesis:
         """Return the hypothesis with other start values."""
@@ -39,7 +42,7 @@ class Hypothesis:
     def limits(self, name: str) -> tuple[float, float]:
         """Return the smallest and the largest value of a parameter, always within the bounds of the effect."""
         table = next(p for p in effect_info(self.effect.name).parameters if p.name == name)
-        least, most = self.bounds.get(name, (table.lower, table.upper))
+        least, most = self.sure.get(name, self.bounds.get(name, (table.lower, table.upper)))
         return max(least, table.lower), min(most, table.upper)
 
 

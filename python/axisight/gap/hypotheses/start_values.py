@@ -38,6 +38,19 @@ def _neutral(trial: StartContext) -> Hypothesis:
     return Hypothesis(trial.effect(values), tuple(values))
 
 
+def _not_below_none(trial: StartContext) -> Hypothesis:
+    """Start at none, and take away no more than the simulator has: no friction is negative in total."""
+    begin = _neutral(trial)
+    return replace(begin, bounds=dict.fromkeys(begin.free, (-_own(trial), np.inf)))
+
+
+def _own(trial: StartContext) -> float:
+    """Return the value of the simulator's own parameter that the effect adds to; zero without one."""
+    adds_to, axis = trial.info.stands_for, trial.index + 1
+    name = None if adds_to is None else trial.robot.axis_parameter(axis, adds_to[0])
+    return 0.0 if name is None else trial.robot.parameters()[name]
+
+
 def _not_last_link(trial: StartContext) -> Hypothesis | None:
     """Start at the neutral values; None for the last axis, whose link carries no further axis."""
     return _neutral(trial) if trial.index + 1 < trial.robot.n_axes else None
@@ -471,7 +484,7 @@ def _read_late(trial: StartContext) -> Hypothesis | None:
 
 
 STARTS: Mapping[str, Callable[[StartContext], Hypothesis | None]] = {
-    "viscous_friction": _neutral,
+    "viscous_friction": _not_below_none,
     "coulomb_friction": dry_law(smoothing_rad_s=SMOOTHING),
     "asymmetric_friction": dry_law(smoothing_rad_s=SMOOTHING),
     "stribeck_friction": stribeck,

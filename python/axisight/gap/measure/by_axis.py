@@ -49,7 +49,8 @@ def without_axis(found: SearchState, fitter: ModelFitter, axis: int) -> SearchSt
 
 
 def _of_axes(found: SearchState, fitter: ModelFitter, axes: set[int]) -> SearchState:
-    kept = [f for f, (_, s) in zip(found.model.free, found.accepted, strict=True) if s.axis in axes]
+    causes = zip(found.model.free, found.accepted, strict=True)
+    kept = [f for f, (_, s) in causes if s.axis in axes or f.sure]
     if len(kept) == len(found.model.free):
         return found
     out = replace(found, steps=[*found.steps])

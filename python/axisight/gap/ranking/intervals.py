@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -13,10 +14,16 @@ from axisight.gap.facts.result import Interval
 from axisight.statistics.intervals import NORMAL_DEVIATIONS
 
 
-def intervals(effect: Effect, free: Sequence[str], std: dict[str, float]) -> dict[str, Interval]:
+def intervals(
+    effect: Effect,
+    free: Sequence[str],
+    std: Mapping[str, float],
+    sure: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+) -> dict[str, Interval]:
     """Return the 95 % intervals of the fitted parameters ``free``; ``std``: their standard errors in the fit.
 
-    Intervals stay within the bounds of the effect: no speed is below zero.
+    Intervals stay within the bounds of the effect: no speed is below zero. ``sure``: as in `Hypothesis`, the narrowest
+    that an interval may be.
     """
     info = effect_info(effect.name)
     values = effect.parameters or {}
@@ -26,7 +33,8 @@ def intervals(effect: Effect, free: Sequence[str], std: dict[str, float]) -> dic
     out = {}
     for name in free:
         size = abs(values[name] - neutral.get(name, 0.0))
-        spread = NORMAL_DEVIATIONS * float(np.hypot(std.get(name, 0.0), share * size))
+        known = max(std.get(name, 0.0), float(np.ptp(sure.get(name, 0.0))) / 2 / NORMAL_DEVIATIONS)
+        spread = NORMAL_DEVIATIONS * float(np.hypot(known, share * size))
         lower, upper = bounds[name]
         low, high = values[name] - spread, values[name] + spread
         out[name] = Interval(values[name], max(low, lower), min(high, upper))

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from axisight.effects import Effect, effect_info, on_every_machine
+from axisight.effects import Effect, effect_info, effect_table, on_every_machine
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
+from axisight.robot import Robot
 
 
 def ordinary_first(
@@ -49,19 +50,49 @@ def is_lacked(one: RankedHypothesis, axis: int, fitter: ModelFitter) -> bool:
     By inverse dynamics only: in closed loop an error of one axis shows on all.
     """
     effect = one.trial.hypothesis.effect
-    if not fitter.adds_up or effect.axis != axis + 1:
+    return effect.axis == axis + 1 and lacks(fitter, effect)
+
+
+def lacks(fitter: ModelFitter, effect: Effect) -> bool:
+    """Whether every machine has an effect, or a part of it, and the simulator states none of that; see `is_lacked`."""
+    if not fitter.adds_up:
         return False
     names = {effect.name, *effect_info(effect.name).parts}
     ordinary = (x for x in names if on_every_machine(x))
     return any(_none_stated(Effect(x, effect.axis), fitter) for x in ordinary)
 
 
+def unsaid(fitter: ModelFitter) -> frozenset[str]:
+    """Return the names of effects of every machine of which the simulator says nothing, or the same of every axis.
+
+    A model file leaves them out, or fills in a number. Empty for a single axis, and in closed loop.
+    """
+    axes = fitter.robot.axis_numbers()
+    if not fitter.adds_up or len(axes) < 2:
+        return frozenset()
+    stated = {
+        name: {stated_amplitude(Effect(name, axis), fitter.robot) for axis in axes}
+        for name in effect_table()
+        if on_every_machine(name)
+    }
+    return frozenset(name for name, values in stated.items() if len(values) == 1)
+
+
 def _none_stated(effect: Effect, fitter: ModelFitter) -> bool:
-    robot, stands_for = fitter.robot, effect_info(effect.name).stands_for
-    own = (
-        None
-        if stands_for is None or effect.axis is None
-        else robot.axis_parameter(effect.axis, stands_for[0])
-    )
-    stated = own is not None and robot.parameters()[own] != 0
-    return not stated and not any(e.label == effect.label for e in robot.effects if e.acts)
+    return stated_amplitude(effect, fitter.robot) == 0
+
+
+def stated_amplitude(effect: Effect, robot: Robot) -> float:
+    """Return the amplitude that a simulator states for an effect, as its own parameter or as an effect; else zero."""
+    own = own_parameter(robot, effect)
+    acting = (e for e in robot.effects if e.label == effect.label and e.acts)
+    beside = next((e.values()[0] for e in acting), 0.0)
+    return beside + (0.0 if own is None else robot.parameters()[own])
+
+
+def own_parameter(robot: Robot, effect: Effect) -> str | None:
+    """Return the name of the simulator's own parameter that an effect changes; None if there is none."""
+    stands_for = effect_info(effect.name).stands_for
+    if stands_for is None or effect.axis is None:
+        return None
+    return robot.axis_parameter(effect.axis, stands_for[0])

@@ -131,6 +131,15 @@ class AxisPosterior:
         ]
         return replace(self, ranked=(first, *rest), ledger=(*self.ledger, *entries))
 
+    def of_member(self, member: FittedHypothesis) -> AxisPosterior:
+        """Return the posterior of one member of the leading set: the members of a set stand and fall together."""
+        label = self.best.trial.label
+        ledger = (
+            replace(x, hypothesis=member.label) if x.hypothesis == label else x for x in self.ledger
+        )
+        first = replace(self.best, trial=member)
+        return replace(self, ranked=(first, *self.ranked[1:]), ledger=tuple(ledger))
+
     def led_by(self, first: RankedHypothesis, rule: str | None = None) -> AxisPosterior:
         """Return the posterior with another candidate first; probabilities stay."""
         entry = () if rule is None else (Adjustment(rule, first.trial.label, 0.0),)

@@ -28,6 +28,7 @@ from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, falls, tria
 from axisight.gap.ranking.judgement import stand
 from axisight.gap.ranking.posterior import AxisPosterior, as_good_with_less, of_one_formula
 from axisight.gap.screening.column_cache import ColumnCache
+from axisight.gap.screening.free_bodies import AS_MUCH
 from axisight.gap.screening.partial_fit import TrialFit
 from axisight.gap.screening.promise import HOPELESS, best_by_axis, least_of_the_arm, promising
 from axisight.gap.screening.restart_look_alike import (
@@ -45,10 +46,8 @@ B = TypeVar("B")
 
 # A hypothesis is skipped if its gain from cached sensitivities is below 0.3 of the screening threshold.
 _ROUGHLY = 0.3
-# A candidate does not wait if it promises this share of the best gain on the axis of the explaining effect. It may be
-# the true cause, and the effect found before may only imitate it on another axis.
-_AS_MUCH = 0.9
-# The same share for an effect of the whole arm. It is lower: one step of a payload finds its mass, not its place.
+# Share of the best gain from which an effect of the whole arm does not wait for the next round; for others `AS_MUCH`,
+# since one step of a payload finds its mass, not its place.
 _HALF_AS_MUCH = 0.5
 # Leaders of an axis that are refined.
 _REFINED = 2
@@ -67,20 +66,26 @@ _FELT = 0.2
 
 
 def fresh(options: Sequence[Hypothesis], model: FittedModel, refused: set[str]) -> list[Hypothesis]:
-    """Return the candidates that the model neither has nor contains, and that were not refused."""
+    """Return the candidates that the model neither has nor contains, and that were not refused.
+
+    None contains a cause that is sure by itself, which it would replace.
+    """
     present = {e.label for e in model.effects}
+    sure = {(f.effect.name, f.effect.axis) for f in model.free if f.sure}
     contained = {(name, e.axis) for e in model.effects for name in effect_info(e.name).contains}
     return [
         o
         for o in options
         if o.effect.label not in present | refused
         and (o.effect.name, o.effect.axis) not in contained
+        and sure.isdisjoint((x, o.effect.axis) for x in effect_info(o.effect.name).contains)
     ]
 
 
 def _share_without_waiting(start: Start) -> float:
     """Return the share of the best gain above which a candidate does not wait for the next round."""
-    return _HALF_AS_MUCH if start.option.effect.axis is None else _AS_MUCH
+    # The candidate may be the true cause, and the effect found before only imitate it on another axis.
+    return _HALF_AS_MUCH if start.option.effect.axis is None else AS_MUCH
 
 
 def _share_removed(found: FittedModel, model: FittedModel, axis: int) -> float:

@@ -16,6 +16,8 @@ from axisight.gap.search.contest import Context, Proposal
 def needless(context: Context) -> Iterator[Proposal]:
     """Propose the set without one cause, for causes that remove too little by a linear step, the least first.
 
+    Not where the cause is sure for any bodies of the arm.
+
     Causes of the family of an effect of the whole arm are always proposed. A payload that was added beside a wrong
     centre of mass settles elsewhere, further away than one linear step predicts.
     """
@@ -24,11 +26,15 @@ def needless(context: Context) -> Iterator[Proposal]:
         return
     taken = np.array([_taken_away(context, f) for f in free])
     for i in np.argsort(taken):
-        if taken[i] <= context.settings.smallest_gain:
+        if taken[i] <= context.settings.smallest_gain and not free[i].sure:
             yield _without(free[i])
     families = {effect_info(f.effect.name).family for f in free if f.effect.place is None}
     for f in free:
-        if f.effect.axis is not None and effect_info(f.effect.name).family in families:
+        if (
+            f.effect.axis is not None
+            and effect_info(f.effect.name).family in families
+            and not f.sure
+        ):
             yield _without(f)
 
 

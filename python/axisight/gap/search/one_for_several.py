@@ -91,10 +91,10 @@ def _beside_a_part(model: FittedModel) -> Groups:
 
 
 def several_together(model: FittedModel) -> Groups:
-    """Return the causes of each axis and family that has more than one."""
+    """Return the causes of each axis and family that has more than one, without those that are sure by themselves."""
     found: Groups = defaultdict(list)
     for f in model.free:
-        if f.effect.axis is not None:
+        if f.effect.axis is not None and not f.sure:
             found[f.effect.axis, effect_info(f.effect.name).family].append(f)
     return {key: several for key, several in found.items() if len(several) > 1}
 

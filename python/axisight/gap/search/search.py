@@ -22,13 +22,15 @@ from axisight.gap.ranking.likelihood import FORMULA_ERROR
 from axisight.gap.ranking.ordinary_first import is_lacked, ordinary_first
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.screening.column_cache import ColumnCache
+from axisight.gap.screening.free_bodies import FreeBodies
+from axisight.gap.screening.ordinary_together import OrdinaryTogether
 from axisight.gap.screening.promise import HOPELESS
 from axisight.gap.screening.screening import kept_beside
 from axisight.gap.screening.search_round import Progress, SearchRound, fresh, interact, same
 from axisight.gap.search.composites import named_simply
 from axisight.gap.search.contest import Context
 from axisight.gap.search.moves import AFTER_EACH_ROUND, AT_THE_END, finish, make
-from axisight.gap.search.pairs import Pairs
+from axisight.gap.search.pairs import Pair, Pairs
 from axisight.gap.search.rivals import NEARLY
 from axisight.gap.search.state import OPEN, Round, SearchState
 from axisight.statistics.tails import normal_deviate
@@ -104,6 +106,8 @@ def _add_causes(
         )
         offered = candidates(out.model)
         options = fresh(offered, out.model, refused)
+        if _took_ordinary(fitter, options, out, settings, round_, progress):
+            continue
         trials = round_.refined(round_.run(options, number), options, number)
         standings, taken = _judged(round_, trials, out, settings, len(options))
         if round_.first(standings, trials) not in {r.trial.label for r, _ in taken}:
@@ -130,6 +134,30 @@ def _add_causes(
         refused |= make(AFTER_EACH_ROUND, Context(fitter, out, settings, offered))
         if _settled(out, settings) or len(out.model.free) >= settings.max_causes:
             break
+
+
+def _took_ordinary(
+    fitter: ModelFitter,
+    options: Sequence[Hypothesis],
+    out: SearchState,
+    settings: Settings,
+    round_: SearchRound,
+    progress: Progress,
+) -> bool:
+    """Add what every machine has and the simulator does not tell, on all axes at once; return whether there is any."""
+    fitter.work.stage = "screening"
+    bodies = FreeBodies(fitter, out.layout, settings, FreeBodies.among(options))
+    together = OrdinaryTogether(out.model, out.floor, bodies)
+    taken = tuple(together.found(options))[: max(settings.max_causes - len(out.model.free), 0)]
+    if not taken:
+        return False
+    standings = tuple({s.axis: s for _, s in taken}.values())
+    left = out.left()
+    if _take_in(round_, out, taken, progress) is not None:
+        return False
+    out.rounds.append(Round(standings, taken, left))
+    out.bodies = out.bodies or bodies
+    return True
 
 
 def refitted(fitter: ModelFitter, progress: Progress) -> FittedModel:
@@ -267,7 +295,8 @@ def _pairs(
         round_.fitter, state.model, trials, round_.current, state.floor, state.layout, settings
     )
     found = [pairs.found(axis, float(first[axis]), tried) for axis in range(state.layout.n_axes)]
-    seen = sorted((p for p in found if p is not None), key=lambda p: -p.gain)
+    seen = [p for p in found if p is not None and _each_allowed(p, trials, state)]
+    seen.sort(key=lambda p: -p.gain)
     fall = falls([p.both for p in seen], round_.current, state.layout)
     kept: list[int] = []
     for k, pair in enumerate(seen):
@@ -332,7 +361,25 @@ def _is_cause(
     least = _least_fall(best, standing.axis, fitter, state, settings)
     large = fall > least and not state.mends(best.trial)
     worth = large and best.score > settings.smallest_score
-    return best.significance > needed and worth and standing.best.probability > standing.p_none
+    led = best.significance > needed and worth and standing.best.probability > standing.p_none
+    return led and _allowed(best.trial, state)
+
+
+def _allowed(one: FittedHypothesis, state: SearchState, beside: FittedModel | None = None) -> bool:
+    """Whether an effect may be a cause, whatever the bodies of the arm where these are not trusted.
+
+    ``beside``: the model without it, by default that of the state.
+    """
+    return state.bodies is None or state.bodies.allow(one, beside or state.model)
+
+
+def _each_allowed(pair: Pair, trials: Sequence[FittedHypothesis], state: SearchState) -> bool:
+    """Whether each of a pair may be a cause beside the other."""
+    fitted = {t.label: t.fitted for t in trials}
+    (one, _), (other, _) = pair.members
+    return _allowed(one.trial, state, fitted.get(other.trial.label)) and _allowed(
+        other.trial, state, fitted.get(one.trial.label)
+    )
 
 
 def _take_in(

@@ -18,6 +18,7 @@ from axisight.gap.fit.sensitivity import Sensitivity
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.likelihood import FORMULA_ERROR
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
+from axisight.gap.screening.free_bodies import FreeBodies
 
 Array = NDArray[np.float64]
 
@@ -49,6 +50,7 @@ class SearchState:
     - ``number``: the round that is under way, from 1.
     - ``stopped``: where the time limit ended the search; None if it ended by itself.
     - ``noise`` (n_axes,): factor on the estimated noise [1]; below one where `refute_floor` lowered the floor.
+    - ``bodies``: the bodies of the arm, where they are not trusted.
     - ``adds_up``: whether the errors of the axes add up; ``by_axis``: whether causes explain single axes, not the arm.
     """
 
@@ -65,6 +67,7 @@ class SearchState:
     adds_up: bool = False
     by_axis: bool = False
     noise: Array = field(default_factory=lambda: np.ones(1))
+    bodies: FreeBodies | None = None
 
     @property
     def accepted(self) -> list[tuple[RankedHypothesis, AxisPosterior]]:

@@ -16,6 +16,8 @@ from axisight.gap.search.rivals import RIVALS
 def size_is_sure(model: FittedModel, place: int) -> bool:
     """Whether the size of an effect of a model differs from what the simulator has; ``place`` counts from 0."""
     one = model.free[place]
+    if one.sure:
+        return True
     std = {name: s for (at, name), s in model.std.items() if at == place}
     return of_sure_size(model.effects[place], one.free, std, one.stated)
 

@@ -340,7 +340,8 @@ def _named(
     values = effect.parameters or {}
     info = effect_info(effect.name)
     std = {name: s for (place, name), s in model.std.items() if place == position}
-    found = intervals(effect, model.free[position].free, std)
+    mine = model.free[position]
+    found = intervals(effect, mine.free, std, mine.sure)
     for p in info.parameters:
         # Orders of a ripple are chosen, not fitted.
         if p.name.startswith("order_") and values.get(p.name):

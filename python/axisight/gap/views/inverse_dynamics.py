@@ -68,6 +68,8 @@ class InverseView(View):
         held_out: Sequence[Log] = (),
         silent: Sequence[int] = (),
     ) -> None:
+        # Torque is predicted at the rate of the logs, whatever the rate of the simulator.
+        robot = _at_the_rate_of(robot, logs)
         cutoff = settings.cutoff_hz
         nyquist_hz = 0.5 / logs[0].sample_time_s
         if cutoff is not None and not 0 < cutoff < nyquist_hz:
@@ -208,6 +210,11 @@ class InverseView(View):
         if self.noise.repeated:
             out.append("The floor is the difference between repeats of one motion.")
         return tuple(out)
+
+
+def _at_the_rate_of(robot: Robot, logs: Sequence[Log]) -> Robot:
+    step_s = logs[0].sample_time_s
+    return robot if robot.sample_time_s == step_s else robot.with_sample_time(step_s)
 
 
 def _is_tried(effect: Effect, model: FittedModel) -> bool:
