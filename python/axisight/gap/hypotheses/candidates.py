@@ -39,15 +39,18 @@ def situation(
     def one(i: int, log: Log, axis: int) -> Turning:
         mine = (model.log == i) & (model.axis == axis)
         first = int(model.start[mine].min())
-        residual = model.residual[first : first + int(model.size[mine].sum())]
+        part = slice(first, first + int(model.size[mine].sum()))
+        residual, bent = model.residual[part], columns[:, part]
         if before:
-            return before[i][axis].leaving(residual)
+            return before[i][axis].leaving(residual, bent)
         position = log.position_rad[:, axis]
         speed = np.gradient(position, log.sample_time_s)
         # A running mean over nine samples removes quantization and noise from the speed.
         speed = np.convolve(speed, np.ones(9) / 9, mode="same")
-        return turning(residual, position, speed, log.sample_time_s, decimation)
+        return turning(residual, position, speed, log.sample_time_s, decimation, bent)
 
+    own = [model.columns[None, name] for place, name in model.at_bound if place is None]
+    columns = np.array([c.values for c in own]).reshape(len(own), len(model.residual))
     axes = range(logs[0].n_axes)
     turned = [[one(i, log, axis) for axis in axes] for i, log in enumerate(logs)]
     return StartData(turned, response, enough)

@@ -31,7 +31,8 @@ class Turning:
     """Residual and motor motion of one axis in one log.
 
     ``residual``, ``angle_rad``, ``speed_rad_s``: (n,) each, every ``sample_time_s``. The first sample of the residual
-    lies ``later_s`` after that of the motion.
+    lies ``later_s`` after that of the motion. ``bent`` (k, n): derivatives of the residual by the simulator's own
+    parameters that a fit has bent to their bounds.
     """
 
     residual: Array
@@ -39,10 +40,11 @@ class Turning:
     speed_rad_s: Array
     sample_time_s: float
     later_s: float = 0.0
+    bent: Array | None = None
 
-    def leaving(self, residual: Array) -> Turning:
-        """Return the same motion with another residual (n,); cached values of the motion stay."""
-        other = replace(self, residual=residual)
+    def leaving(self, residual: Array, bent: Array | None = None) -> Turning:
+        """Return the same motion with another residual (n,) and ``bent``; cached values of the motion stay."""
+        other = replace(self, residual=residual, bent=bent)
         vars(other).update({k: v for k, v in vars(self).items() if k in _KNOWN_OF_WAVES})
         return other
 
@@ -97,9 +99,17 @@ class Turning:
 
 
 def turning(
-    residual: Array, position_rad: Array, speed_rad_s: Array, sample_time_s: float, decimation: int
+    residual: Array,
+    position_rad: Array,
+    speed_rad_s: Array,
+    sample_time_s: float,
+    decimation: int,
+    bent: Array | None = None,
 ) -> Turning:
-    """Return a residual that was decimated as in `Weighting`, with angle and speed of the full log at its samples."""
+    """Return a residual that was decimated as in `Weighting`, with angle and speed of the full log at its samples.
+
+    ``bent``: see `Turning`.
+    """
     count = len(residual)
     return Turning(
         residual,
@@ -108,6 +118,7 @@ def turning(
         sample_time_s * decimation,
         # A decimated sample lies in the middle of the samples that it replaces.
         0.5 * (decimation - 1) * sample_time_s,
+        bent,
     )
 
 
@@ -123,18 +134,27 @@ def strongest_orders(
     Method: least squares of the residuals of all logs on cosine and sine of ``n phi`` after the response, with one
     amplitude and phase for all logs. One order after another is added, each fitted with those before it (orthogonal
     matching pursuit; Pati, Rezaiifar, Krishnaprasad, 1993). The search ends if an order explains less than 5 % of the
-    remaining squared residual.
+    remaining squared residual. What bent parameters of the simulator may have taken up is left out of residuals and
+    waves.
 
     Cost: one Fourier transform for each order and log, and products of 160 values per sample. Both are cached by motion
     and response.
     """
     size = 2 * HIGHEST_ORDER
     normal, along, power = np.zeros((size, size)), np.zeros(size), 0.0
-    for log, response in zip(logs, responses, strict=True):
+    bends = _bends(logs)
+    bent_waves, bent_residual = np.zeros((size, bends[0].shape[1])), np.zeros(bends[0].shape[1])
+    for log, response, bend in zip(logs, responses, bends, strict=True):
         residual = log.residual - log.residual.mean()
         normal += log.normal(response)
         along += log.along(response, residual)
         power += float(residual @ residual)
+        for i, column in enumerate(bend.T):
+            bent_waves[:, i] += log.along(response, column)
+        bent_residual += bend.T @ residual
+    normal -= bent_waves @ bent_waves.T
+    along -= bent_waves @ bent_residual
+    power -= float(bent_residual @ bent_residual)
     turns = max(float(np.ptp(log.angle_rad)) for log in logs) / (2 * np.pi)
     fitted: list[int] = []
     found: list[int] = []
@@ -151,6 +171,15 @@ def strongest_orders(
         fitted.append(order)
         power -= float(gains[best])
     return found
+
+
+def _bends(logs: Sequence[Turning]) -> list[Array]:
+    """Return an orthonormal basis of what bent parameters change, (n, k) for each log; k may be zero."""
+    columns = [np.zeros((0, len(log.residual))) if log.bent is None else log.bent for log in logs]
+    level = np.concatenate([(x - x.mean(axis=1, keepdims=True)).T for x in columns])
+    basis, size, _ = np.linalg.svd(level, full_matrices=False)
+    basis = basis[:, size > _LEAST_APART * size.max(initial=0.0)]
+    return np.split(basis, np.cumsum([len(log.residual) for log in logs])[:-1])
 
 
 def passed(series: Array, response: Complex) -> Array:

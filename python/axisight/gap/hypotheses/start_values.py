@@ -5,7 +5,7 @@ An entry takes a :class:`StartContext` and returns a hypothesis, or None if the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -61,7 +61,10 @@ _LEAST_WAVES, _SLIDE_WAVES = 1.0, 2.0
 
 
 def _waves(trial: StartContext) -> Hypothesis | None:
-    """Start with the strongest orders of the residual over the motor angle; None without any."""
+    """Start with the strongest orders of the residual over the motor angle; None without any.
+
+    A short travel hardly tells neighbouring orders apart, so that the first one may be any of them.
+    """
     terms = trial.info.terms().values()
     orders = _orders(trial, len(terms))
     if not orders:
@@ -72,7 +75,16 @@ def _waves(trial: StartContext) -> Hypothesis | None:
     for n, (order, *waves) in zip(orders, terms, strict=False):
         values[order] = float(n)
         free += waves
-    return Hypothesis(trial.effect(values | dict.fromkeys(free, 0.0)), tuple(free))
+    first, *_ = next(iter(trial.info.terms().values()))
+    starts = tuple({first: float(n)} for n in _neighbours(trial, orders))
+    return Hypothesis(trial.effect(values | dict.fromkeys(free, 0.0)), tuple(free), starts=starts)
+
+
+def _neighbours(trial: StartContext, orders: Sequence[int]) -> list[int]:
+    """Return the orders beside the first one, if they are less than a wave over the travel apart from it."""
+    turns = max(float(np.ptp(log.angle_rad)) for log in trial.turned()[0]) / (2 * np.pi)
+    beside = (orders[0] - 1, orders[0] + 1) if turns < 1.0 else ()
+    return [n for n in beside if n * turns >= _LEAST_WAVES and n not in orders]
 
 
 def _orders(trial: StartContext, count: int) -> list[int]:

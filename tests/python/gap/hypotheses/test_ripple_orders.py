@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from axisight import Effect, load_robot, simulate
+from axisight import Effect, Settings, diagnose, load_robot, simulate
 from axisight.gap.controller.feedback import controller_response, loop_responses, periodic_response
 from axisight.gap.hypotheses.ripple_orders import Turning, strongest_orders, turning
+from gap_data import bare_axis, log_of
 
 T = 4e-3
 N = 2500
@@ -83,6 +84,38 @@ def test_orders_are_seen_through_the_response():
     log = turned(np.fft.irfft(late * (empty.spectra[23] + 0.5 * empty.spectra[4]), N))
     assert strongest_orders([log], [late], count=2) == [24, 5]
     assert strongest_orders([log], [flat(log)], count=2) != [24, 5]
+
+
+def test_what_a_bent_parameter_took_up_does_not_hide_an_order():
+    """A slow swing: the rate and the curve of the angle take up most of its ripple of order 6, and 5 seems stronger."""
+    swing = swinging(0.8, lambda angle: np.cos(6 * angle + 0.3))
+    own = np.stack([swing.speed_rad_s, np.gradient(swing.speed_rad_s, T), swing.angle_rad])
+    took = np.linalg.lstsq(own.T, swing.residual, rcond=None)[0]
+    # What a fit in closed loop takes up may be many times the least squares of this residual.
+    bent = swing.leaving(swing.residual - 20.0 * took @ own)
+    assert strongest_orders([bent], [flat(bent)], count=1) != [6]
+    told = swing.leaving(bent.residual, own)
+    assert strongest_orders([told], [flat(told)], count=1) == [6]
+
+
+def test_a_slow_ripple_is_found_although_own_parameters_went_to_their_bounds():
+    """It moves a light axis so slowly that masses, friction and gains all bend towards it."""
+    robot = bare_axis()
+    ripple = Effect("torque_ripple", 1, {"order_1": 6.0, "cosine_1_nm": 0.4, "sine_1_nm": 0.3})
+    time = np.arange(int(6.0 / robot.sample_time_s)) * robot.sample_time_s
+    logs = [
+        log_of(
+            robot,
+            [ripple],
+            (5.0 * np.sin(2 * np.pi * f * time) * np.minimum(time, 1.0))[:, None],
+            run,
+        )
+        for run, f in enumerate((0.3, 0.4, 0.5, 0.35))
+    ]
+    said = diagnose(robot, logs[:3], validation=logs[3:], settings=Settings(threads=1))
+    assert said.verdict == "explained"
+    assert [c.label for c in said.causes] == ["torque_ripple@1"]
+    assert said.causes[0].parameters["order_1"].value == 6.0
 
 
 @pytest.mark.parametrize("n", [N, N - 1])
