@@ -38,7 +38,8 @@ class JointRegression:
         self._all = np.ones(len(at.parameters), dtype=bool)
         self._weight = self._weights()
         self.step = self._minimum(self._weight, self._all)
-        without = self._without_each(self._all)
+        # A step at its bound is no surer for that: the scatter is that of steps without bounds.
+        without = self._without_each(self._all, bounded=False)
         self._freedom = len(without) - 1
         self.deviation = np.sqrt(self._freedom * without.var(axis=0))
 
@@ -67,7 +68,8 @@ class JointRegression:
             float(predicted_loss(self.at, here, x).sum())
             for x in (self.step, self._minimum(self._weight, others))
         )
-        return without / with_it - 1.0
+        # Without noise, nothing is left but rounding.
+        return without / max(with_it, 1e-300) - 1.0
 
     def weighed(self, loss: Array, axis: int | None) -> float:
         """Return a loss by block (n_blocks,), weighed by axis, on one axis (from 0) or on all."""
@@ -95,14 +97,13 @@ class JointRegression:
             out[here] = float(self.layout.counted[here].sum()) / max(left, 1e-300)
         return out
 
-    def _without_each(self, moving: Mask) -> Array:
+    def _without_each(self, moving: Mask, *, bounded: bool = True) -> Array:
         """Return the steps without each stretch (n_stretches, p)."""
         stretch = self.layout.stretch
-        return np.array(
-            [self._minimum(self._weight * (stretch != k), moving) for k in np.unique(stretch)]
-        )
+        each = (self._weight * (stretch != k) for k in np.unique(stretch))
+        return np.array([self._minimum(weight, moving, bounded=bounded) for weight in each])
 
-    def _minimum(self, weight: Array, moving: Mask) -> Array:
+    def _minimum(self, weight: Array, moving: Mask, *, bounded: bool = True) -> Array:
         """Return the step (p,) of the ``moving`` parameters to the minimum; ``weight`` (n_blocks,)."""
         at, pick = self.at, np.ix_(moving, moving)
         one = NormalEquations(
@@ -113,7 +114,7 @@ class JointRegression:
             loss=np.array([weight @ at.loss]),
             prior_matrix=at.prior_matrix[pick],
             prior_gradient=at.prior_gradient[moving],
-            room=at.room,
+            room=at.room if bounded else {},
         )
         step = np.zeros(len(at.parameters))
         step[moving] = linear_step(one)

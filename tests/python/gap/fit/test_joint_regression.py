@@ -62,11 +62,15 @@ def test_a_value_is_sure_where_the_stretches_agree():
     assert high - low == pytest.approx(4.4 * found.deviation[0], rel=0.01)
 
 
-def test_a_value_at_its_bound_does_not_scatter():
-    found = regression(bounds=(0.0, np.inf))
-    assert found.step[1] == 0.0
-    assert found.deviation[1] == 0.0
-    assert not found.is_sure(1, 0.05)
+@pytest.mark.parametrize("bound", [0.0, -0.5])
+def test_a_value_at_its_bound_scatters_as_one_without_bounds(bound: float):
+    """It is not known to the last digit. At zero, it is no change at all."""
+    found = regression(bounds=(bound, np.inf))
+    assert found.step[1] == bound
+    assert found.deviation[1] == pytest.approx(regression().deviation[1], rel=1e-9)
+    assert found.is_sure(1, 1e-6) == (bound < 0.0)
+    low, high = found.interval(1, 0.95)
+    assert low < bound < high
 
 
 def test_a_loose_value_is_held_by_its_bounds_only():

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.signal
 from numpy.typing import NDArray
 
 from axisight import Log
@@ -55,6 +56,18 @@ def test_a_motor_that_goes_off_is_refused_with_its_time(after: Array, as_speed: 
     assert OFF_S - 1.2 <= cut <= OFF_S
 
 
+def answered(target: Array, loop_hz: float) -> Array:
+    """Return the position of a loop of second order (n,), damped by 0.7, for a target."""
+    w, step = 2 * np.pi * loop_hz, 1 / RATE_HZ
+    transfer = scipy.signal.cont2discrete(([w**2], [1.0, 1.4 * w, w**2]), step)
+    return np.asarray(scipy.signal.lfilter(transfer[0].ravel(), transfer[1], target))
+
+
+def sweep(first_hz: float, last_hz: float) -> Array:
+    return 0.4 * np.asarray(scipy.signal.chirp(TIME, first_hz, TIME[-1], last_hz, phi=-90))
+
+
+STEPPED = np.where(TIME < 12.0, 0.4 * np.sin(np.pi * TIME), 0.4 * np.sin(12 * np.pi * TIME))
 BEND = np.where(TIME < OFF_S, TARGET, TARGET[int(OFF_S * RATE_HZ)])
 FOLLOWED = {
     "exact": (TARGET, TARGET),
@@ -65,6 +78,8 @@ FOLLOWED = {
     "off for two seconds": (np.where((TIME > 8) & (TIME < 10), TARGET[1600], TARGET), TARGET),
     "stuck all the time": (np.zeros(len(TIME)), TARGET),
     "elastic": (TARGET + 0.1 * np.sin(40.0 * TIME), TARGET),
+    "a fast sine in the end": (answered(STEPPED, 3.0), STEPPED),
+    "a sweep beyond the loop": (answered(sweep(0.1, 10.0), 2.0), sweep(0.1, 10.0)),
     "never moved": (np.zeros(len(TIME)), np.zeros(len(TIME))),
 }
 

@@ -22,6 +22,8 @@ def check_stopped_following(log: Log) -> list[Finding]:
 
     - Most stretches with a moving target are followed before that time, and none is after it.
     - There are at least two of them after it, and the position moves less than the target there.
+    - The position does not answer the target there either, with any gain and phase: a target that is faster than the
+      loop is answered, if not followed.
 
     A target that rests tells nothing, and a position that comes late is compared with the target of that time before.
     """
@@ -67,8 +69,29 @@ def _stopped_at(position: Array, target: Array, step_s: float) -> float | None:
     before[last + 1 :] = after[: last + 1] = False
     over = np.sum(after) >= 2 and bool(np.all((left[after] > UNLIKE) & less[after]))
     mostly = np.mean(left[before] < ALIKE) > 0.5
+    if not (over and mostly) or np.median(_answered(position, target, length)[after]) > UNLIKE:
+        return None
     # The last stretch that is followed may hold the time itself.
-    return float(last * length * step_s) if over and mostly else None
+    return float(last * length * step_s)
+
+
+def _answered(position: Array, target: Array, length: int) -> Array:
+    """Return the share of a position's motion that a target and its rate explain, by stretch (n_stretches,).
+
+    A constant and a drift of the position are no motion.
+    """
+    out = []
+    line = np.column_stack([np.ones(length), np.linspace(-1.0, 1.0, length)])
+    for first in range(0, len(target) // length * length, length):
+        part = slice(first, first + length)
+        x, y = (
+            z[part] - line @ np.linalg.lstsq(line, z[part], rcond=None)[0]
+            for z in (position, target)
+        )
+        told = np.column_stack([y, np.gradient(y)])
+        left = x - told @ np.linalg.lstsq(told, x, rcond=None)[0]
+        out.append(1.0 - float(left @ left) / max(float(x @ x), 1e-300))
+    return np.array(out)
 
 
 def _stretches(position: Array, target: Array, length: int) -> tuple[Array, Mask, Mask]:
