@@ -312,7 +312,8 @@ class ModelFitter(ABC):
                 own[p.name] = value
             else:
                 effects[p.effect] = effects[p.effect].with_values({p.name: value})
-            steps[p.effect, p.name] = p.scale if value + p.scale <= p.upper else -p.scale
+            up, down = p.upper - value, value - p.lower
+            steps[p.effect, p.name] = min(p.scale, up) if up >= down else -min(p.scale, down)
         return gear_rows(self.gears, at.parameters, own, effects, [steps[n] for n in at.parameters])
 
     def evaluate(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from axisight.effects import Effect
+from axisight.effects import Effect, effect_info
 from axisight.gap.fit.tolerance_edges import bent
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.search.contest import Alternative, Context, Proposal
@@ -32,6 +32,8 @@ def exchanged(context: Context) -> Iterator[Proposal]:
             rivals = open_rivals(cause, state.standings_of(cause))
         else:
             continue
+        seen = [*standing.ranked, *(r for s in context.last for r in s.ranked)]
+        rivals = with_plainer_laws(cause, rivals, seen)
         alone = len(state.model.free) == 1
         instead = tuple(
             Alternative(r.trial.fitted.free[-1], r.trial.fitted if alone else state.model)
@@ -62,6 +64,30 @@ def open_rivals(
     stood = sorted((r for s in led for r in s.inseparable()), key=lambda r: -r.probability)
     likeliest = {r.trial.label: r for r in reversed(stood)}
     return [r for r in stood if r is likeliest[r.trial.label] and r.trial.label != label]
+
+
+def with_plainer_laws(
+    cause: RankedHypothesis, rivals: Sequence[RankedHypothesis], seen: Sequence[RankedHypothesis]
+) -> list[RankedHypothesis]:
+    """Return rivals of a cause, each before it the plainer law that it or the cause adds to, if ``seen`` has that.
+
+    A richer law is never judged without its plainer one.
+    """
+    out: list[RankedHypothesis] = []
+    for rich in (cause, *rivals):
+        effect = rich.trial.hypothesis.effect
+        plainer = effect_info(effect.name).plainer
+        plain = None if plainer is None else (plainer.law, effect.axis)
+        same = (
+            r
+            for r in seen
+            if (r.trial.hypothesis.effect.name, r.trial.hypothesis.effect.axis) == plain
+        )
+        found = next(same, None)
+        out += [found] if found is not None else []
+        out += [rich] if rich is not cause else []
+    first = {r.trial.label: r for r in reversed(out)}
+    return [r for r in out if r is first[r.trial.label]]
 
 
 def mending(cause: RankedHypothesis, standings: Sequence[AxisPosterior]) -> list[RankedHypothesis]:
