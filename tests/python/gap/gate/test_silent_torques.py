@@ -82,6 +82,31 @@ def test_closed_loop_needs_all_torques() -> None:
     assert found.view(Settings(threads=1)).mode == "inverse_dynamics"
 
 
+def parked(case: Case, axis: int) -> Case:
+    """Return the case with an axis (from 0) that rests, without torque."""
+    for field in ("position_rad", "velocity_ref_rad_s", "torque_nm"):
+        if getattr(case.logs[0], field) is not None:
+            case = every(case, field, axis, zeros)
+    return case
+
+
+def test_a_parked_axis_is_not_dead() -> None:
+    """It is judged in closed loop with the others."""
+    case = parked(clean_arm(), 1)
+    assert silent_axes(case.robot, case.logs) == ()
+    assert ("channel_constant", "flag", 2) in findings(case)
+    case = parked(loop_case(), 2)
+    found = behind_gate(case.robot, case.estimation, case.validation, ())
+    assert found.silent == ()
+    assert found.view(Settings(threads=1)).mode == "closed_loop"
+
+
+def test_a_dead_axis_may_park_in_some_logs() -> None:
+    case = every(clean_arm(), "torque_nm", 1, zeros)
+    case = replace(case, validation=parked(case, 1).validation)
+    assert silent_axes(case.robot, case.logs) == (1,)
+
+
 @functools.cache
 def diagnosed() -> Diagnosis:
     """Return the diagnosis of an arm with friction on axes 1 and 3, and a dead current on axis 2."""
