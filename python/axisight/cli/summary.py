@@ -145,7 +145,7 @@ def _gaps(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
     table: list[tuple[str, ...]] = [(head, "before", "re-fitted", "after", "floor", "verdict")]
     shown = rows
     if len(rows) > detail.axes:
-        largest = sorted(rows, key=lambda row: _excess(row[2]), reverse=True)[: detail.axes]
+        largest = sorted(rows, key=lambda row: _excess(*row[1:]), reverse=True)[: detail.axes]
         shown = sorted(largest)
     for i, verdict, stages in shown:
         table.append((f"axis {axis_label(i, found.joints)}", *map(_share, stages), verdict))
@@ -158,8 +158,13 @@ def _gaps(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
     return out + [line for text in _basis(found) for line in _folded(text, width)]
 
 
-def _excess(stages: Sequence[float]) -> float:
-    """Return the squared gap of an axis above its floor; infinite for NaN, so that this axis comes first."""
+def _excess(verdict: str, stages: Sequence[float]) -> float:
+    """Return the squared gap of an axis above its floor; infinite, so that it comes first, where a run broke off.
+
+    An axis that is not judged comes last.
+    """
+    if verdict == in_words("not_judged"):
+        return -math.inf
     before, _, _, floor = stages
     return before**2 - floor**2 if math.isfinite(before) else math.inf
 

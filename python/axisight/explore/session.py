@@ -63,7 +63,8 @@ class Seen:
     - ``residual``: simulated minus measured torque.
     - ``position_rad``: simulated motor position (n, n_axes) [rad, m]; None if the simulator takes the
       measured one.
-    - ``gap`` (n_axes,): rms of the residual over the standard deviation of the measured torque [1].
+    - ``gap`` (n_axes,): rms of the residual over the standard deviation of the measured torque [1]; NaN on axes that
+      are not judged.
     - ``bands`` (n_axes, n_bands): the gap in each of `Session.bands`; the squares sum to that of the gap.
     - ``broken_at_s``: time at which the simulation broke off, with NaN from there on; None for a whole run.
     """
@@ -125,11 +126,12 @@ class Session:
     def largest_gap(self) -> tuple[int, int]:
         """Return the validation log and the axis (both from 0) with the largest gap as given.
 
-        The axis has the largest gap above the floor over all validation logs. A simulation that broke off
-        counts as the largest gap.
+        The axis has the largest gap above the floor over all validation logs, of those that are judged. A
+        simulation that broke off counts as the largest gap.
         """
-        above = self.held_given**2 - self.held_floor**2
-        axis = int(np.argmax(np.nan_to_num(above, nan=np.inf)))
+        above = np.nan_to_num(self.held_given**2 - self.held_floor**2, nan=np.inf)
+        above[list(self.view.silent)] = -np.inf
+        axis = int(np.argmax(above))
         first = len(self.logs) - len(self._held)
         gaps = [self.see(first + i).gap[axis] for i in range(len(self._held))]
         return first + int(np.argmax(np.nan_to_num(gaps, nan=np.inf))), axis
@@ -183,6 +185,7 @@ class Session:
         gap = self._gap([item], [counted], [measured])
         variance = np.maximum(np.var(item.torque_nm, axis=0), 1e-300)
         bands = self._by_band(counted, variance, item.sample_time_s)
+        bands[list(self.view.silent)] = np.nan
         return Seen(measured, simulated, residual, position, gap, bands, broken)
 
     def held_gap(self, version: Version = AS_GIVEN) -> Array:
@@ -213,8 +216,8 @@ class Session:
 
     def _gap(self, logs: list[Log], errors: list[Array], measured: list[Array]) -> Array:
         with np.errstate(invalid="ignore"):
-            per_log = stage(logs, errors, self.settings.block_s, measured).per_log()
-        return combine(per_log)
+            found = stage(logs, errors, self.settings.block_s, measured, self.view.silent)
+        return combine(found.per_log())
 
     def _by_band(self, residual: Array, variance: Array, sample_time_s: float) -> Array:
         if not np.isfinite(residual).all():

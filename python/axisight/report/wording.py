@@ -233,9 +233,9 @@ class GapMap:
 def gap_maps(diagnosis: Diagnosis) -> list[GapMap]:
     """Return the band map and all regime maps with cells, in order.
 
-    Axes with the verdict *none* have no significant cells.
+    Axes with the verdict *none*, and those that are not judged, have no significant cells.
     """
-    quiet = [a.axis for a in diagnosis.axes if a.verdict == "none"]
+    quiet = [a.axis for a in diagnosis.axes if a.verdict in ("none", "not_judged")]
     candidates = [("Frequency band", "band", diagnosis.band_map)] + [
         (regime_name(name), "bin", data) for name, data in diagnosis.regime_maps.items()
     ]

@@ -160,6 +160,17 @@ def test_of_many_axes_those_with_the_largest_gaps_are_told():
     assert f"and {n - len(told)} more axes, with less of a gap: --verbose" in lines
 
 
+def test_of_many_axes_those_that_are_not_judged_are_told_last():
+    n = 20
+    figures = np.full(n, 0.05)
+    figures[9] = np.nan
+    axes = tuple(
+        AxisVerdict(i, "not_judged" if i == 10 else "none", 0.0, 0.0, ()) for i in range(1, n + 1)
+    )
+    found = replace(explained(), gap=Gap(0.2, 0.2, 0.05, 0.05, *[figures] * 4), axes=axes)
+    assert not any(line.startswith("axis 10 ") for line in summary(found, WIDTH))
+
+
 def test_findings_that_matter_come_first_and_the_rest_is_counted():
     minor = explained().findings[0]
     major = Finding("simulator_differs", "flag", "expected a model " + "word " * 40, field="axis 1")

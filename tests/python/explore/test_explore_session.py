@@ -1,6 +1,7 @@
 """The explorer without its page: its figures are those of a diagnosis."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,6 +71,22 @@ def test_same_again_is_not_simulated_again(session, monkeypatch):
     first = session.see(0, version)
     monkeypatch.setattr(session.view, "run", None)
     np.testing.assert_array_equal(session.see(0, version).simulated, first.simulated)
+
+
+def test_an_axis_that_is_not_judged_has_no_gap_and_is_not_shown_first(case):
+    """The current of axis 2, which lacks a cause, is dead."""
+
+    def dead(log):
+        torque = log.torque_nm.copy()
+        torque[:, 1] = 0.0
+        return replace(log, torque_nm=torque)
+
+    logs = [[dead(log) for log in each] for each in (case.estimation, case.validation)]
+    session = Session(case.name, load_robot(case.robot_path), *logs)
+    assert session.view.silent == (1,)
+    gap = session.see(0).gap
+    assert np.isnan(gap[1]) and np.isfinite(np.delete(gap, 1)).all()
+    assert session.largest_gap()[1] != 1
 
 
 def test_unstable_simulator_is_said(session):

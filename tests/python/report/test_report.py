@@ -10,7 +10,7 @@ from axisight.gap import Interval
 from axisight.gap.facts import result
 from axisight.report import render_report, save_report
 from axisight.report.figures import MAX_OVERLAYS
-from axisight.report.wording import standard_errors
+from axisight.report.wording import gap_maps, standard_errors
 from diagnosis_data import VERDICTS, explained, named_everywhere, of, one_prismatic, overlay
 from pages import Page, assert_strict
 
@@ -115,6 +115,13 @@ def test_pooled_remainder_and_findings_are_on_the_page():
     assert "Findings about robot file and logs" not in clean
     plain = replace(explained(), gap=replace(explained().gap, pooled=None), remainder=None)
     assert "√(Σ e² / Σ u²)" not in render_report(plain)
+
+
+def test_an_axis_that_is_not_judged_has_no_significant_cells():
+    found = explained()
+    assert any(m.significant.any() for m in gap_maps(found))
+    axes = tuple(replace(a, verdict="not_judged") for a in found.axes)
+    assert not any(m.significant.any() for m in gap_maps(replace(found, axes=axes)))
 
 
 def test_a_failed_write_leaves_nothing(tmp_path, monkeypatch):

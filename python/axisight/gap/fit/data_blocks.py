@@ -23,7 +23,7 @@ class Layout:
     """Axis, stretch and log of each data block of a problem.
 
     ``axis`` (from 0), ``stretch``, ``log``: (n_blocks,) each. ``counted`` (n_blocks,): total weight of the residuals of
-    a block, their number if no sample has less weight.
+    a block, their number if no sample has less weight. ``silent``: axes that are not judged.
 
     A stretch is a piece of time of one log with all axes, because events on two axes at one time are not independent.
     """
@@ -32,6 +32,7 @@ class Layout:
     stretch: NDArray[np.int64]
     log: NDArray[np.int64]
     counted: Array
+    silent: tuple[int, ...] = ()
 
     @property
     def n_axes(self) -> int:
@@ -69,8 +70,8 @@ class Layout:
         return max(_standard_errors(fall, logs), _standard_errors(relative, logs))
 
 
-def layout_of(fitted: FittedModel) -> Layout:
-    """Return axis, stretch and log of the blocks of a fitted model.
+def layout_of(fitted: FittedModel, silent: tuple[int, ...] = ()) -> Layout:
+    """Return axis, stretch and log of the blocks of a fitted model; ``silent`` as in `Layout`.
 
     The stretches of a log have equal weight. A stretch in which every axis stands still would add a fall of zero and
     understate the scatter.
@@ -90,7 +91,7 @@ def layout_of(fitted: FittedModel) -> Layout:
         for rows in by_axis:
             stretch[rows] = first + numbers
         first += int(numbers.max()) + 1
-    return Layout(fitted.axis, stretch, fitted.log, fitted.samples)
+    return Layout(fitted.axis, stretch, fitted.log, fitted.samples, silent)
 
 
 def _even_parts(counted: Array, count: int) -> NDArray[np.int64]:

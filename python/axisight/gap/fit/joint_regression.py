@@ -88,9 +88,12 @@ class JointRegression:
         return out
 
     def _weights(self) -> Array:
-        """Return the weight of every block (n_blocks,): one over the mean square that the axis' own fit leaves."""
+        """Return the weight of every block (n_blocks,): one over the mean square that the axis' own fit leaves.
+
+        Zero on axes that are not judged.
+        """
         out = np.zeros(len(self.at.loss))
-        for axis in np.unique(self.layout.axis):
+        for axis in np.setdiff1d(self.layout.axis, self.layout.silent):
             here = self.layout.of(int(axis))
             step = self._minimum(here.astype(np.float64), self._all)
             left = float(predicted_loss(self.at, here, step).sum())

@@ -55,10 +55,12 @@ class ModelFitter(ABC):
     """Fits models to one set of logs; subclasses define the error that is minimised.
 
     A model that cannot be simulated is returned as `Diverged`; misuse raises InputError. ``adds_up``: the errors of the
-    effects of an axis add up and can hide one another. Missing effects are then tried in pairs, too.
+    effects of an axis add up and can hide one another. Missing effects are then tried in pairs, too. ``silent``: axes
+    (from 0) that are not judged.
     """
 
     adds_up = False
+    silent: tuple[int, ...] = ()
 
     def __init__(
         self, robot: Robot, weighting: Weighting, tolerances: Mapping[str, float], block_s: float

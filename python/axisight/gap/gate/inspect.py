@@ -100,7 +100,7 @@ def check_inputs(
     if refused(found):
         return tuple(found)
     alone = _logs(robot, estimation, validation)
-    others = _refused_logs(f for f in alone if f.name != "channel_constant")
+    others = _refused_logs(f for f in flagged(alone, despite) if f.name != "channel_constant")
     silent = silent_axes(robot, _but([*estimation, *validation], others))
     found += flagged(set_aside(alone, silent), despite)
     spoiled = _refused_logs(found)

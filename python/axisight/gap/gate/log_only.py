@@ -30,6 +30,11 @@ _TRAVEL = 0.01
 _LIMIT = ", or the drive stays at its limit and cannot hold the arm"
 
 
+def moves(log: Log) -> NDArray[np.bool_]:
+    """Return which axes (n_axes,) travel so far that a constant torque is dead, not at rest."""
+    return np.asarray(np.ptp(log.position_rad, axis=0) > _TRAVEL)
+
+
 def channels(log: Log) -> tuple[dict[Channel, Array], dict[Channel, str]]:
     """Return the signals (n,) of a log by field and axis (from 0), and the names of their columns."""
     signals: dict[Channel, Array] = {}

@@ -1,4 +1,4 @@
-"""Finds axes whose torque carries nothing: a dead current, a channel that was never recorded, a coarse one at rest.
+"""Finds axes that travel and whose torque carries nothing: a dead current, or a channel that was never recorded.
 
 Such an axis is set aside: nothing is fitted to its torque, and its verdict is *not judged*. The others go on. Their
 torques need its motion, not its torque.
@@ -16,6 +16,7 @@ from axisight.gap.gate.by_dynamics.axis_travel import travels
 from axisight.gap.gate.by_dynamics.inverse_checks import thinned
 from axisight.gap.gate.by_dynamics.torque_fit import EXPLAINED, torque_fit
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict
+from axisight.gap.gate.log_only import moves
 from axisight.gap.signals.noise import white_std
 from axisight.logs import Log
 from axisight.logs.quality import is_constant
@@ -25,13 +26,16 @@ from axisight.robot import Robot
 def silent_axes(robot: Robot, logs: Sequence[Log]) -> tuple[int, ...]:
     """Return the axes (from 0) whose torque carries nothing in any log; none where all torques do not.
 
-    A torque carries nothing if it never changes. Nor does one that is smaller than its own noise within the band of
-    the motion, where neither the simulator nor friction explains it, on an axis that travels.
+    On an axis that travels, a torque carries nothing if it never changes. Nor does one that is smaller than its own
+    noise within the band of the motion, where neither the simulator nor friction explains it. The torque of an axis
+    at rest may be constant.
     """
     if not logs or any(log.n_axes != robot.n_axes for log in logs):
         return ()
-    constant = [[is_constant(x) for x in log.torque_nm.T] for log in logs]
-    silent = np.all(np.array(constant) | [_says_nothing(robot, log) for log in logs], axis=0)
+    constant = np.array([[is_constant(x) for x in log.torque_nm.T] for log in logs])
+    noise = np.array([_says_nothing(robot, log) for log in logs])
+    dead = constant & [moves(log) for log in logs]
+    silent = np.all(constant | noise, axis=0) & np.any(dead | noise, axis=0)
     return () if silent.all() else tuple(np.flatnonzero(silent).tolist())
 
 

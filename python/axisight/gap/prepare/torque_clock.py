@@ -19,6 +19,7 @@ from axisight.gap.gate.by_dynamics.torque_fit import ALIKE, PARTS, SIGNIFICANT, 
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from axisight.gap.signals.motion import Motion
 from axisight.logs import Log
+from axisight.logs.quality import is_constant
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -115,8 +116,12 @@ def _delayed(x: Array, samples: float) -> Array:
 
 
 def _cells(robot: Robot, log: Log) -> list[Array]:
-    """Return product and energy of the torques' rate on what the simulator leaves, (n_axes, 2) for each part."""
-    sample_time_s, at = thinned(log)
+    """Return product and energy of the torques' rate on what the simulator leaves, (n_axes, 2) for each part.
+
+    Zero for a constant torque, of which only rounding would vary.
+    """
+    varies = [not is_constant(x) for x in log.torque_nm.T]
+    sample_time_s, at = thinned(replace(log, torque_nm=log.torque_nm * varies))
     base = predict(robot, at)
     pairs = [_rate_and_left(at, base, axis, sample_time_s) for axis in range(robot.n_axes)]
     rates, lefts = (np.column_stack(x) for x in zip(*pairs, strict=True))

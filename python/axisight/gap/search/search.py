@@ -58,7 +58,8 @@ def search(
     """
     baseline = baseline or refitted(fitter, progress)
     floor = expected[baseline.axis] * baseline.samples
-    out = SearchState(baseline, baseline, floor, layout_of(baseline), adds_up=fitter.adds_up)
+    layout = layout_of(baseline, fitter.silent)
+    out = SearchState(baseline, baseline, floor, layout, adds_up=fitter.adds_up)
     limited = fitter.until(limit)
     try:
         _add_causes(limited, candidates, out, settings, progress)

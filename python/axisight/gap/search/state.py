@@ -76,7 +76,7 @@ class SearchState:
         return [entered[f.effect.label] for f in self.model.free]
 
     def refute_floor(self) -> None:
-        """Lower the floor of the axes where the model leaves less than it on data left out of the fit.
+        """Lower the floor of the judged axes where the model leaves less than it on data left out of the fit.
 
         No model predicts noise, so what it leaves there is the larger of the two.
         """
@@ -85,6 +85,8 @@ class SearchState:
         share = np.maximum(left, 0.0) / np.maximum(least, 1e-300)
         stands = [at_floor(f, x) for f, x in zip(np.sqrt(least), np.sqrt(left), strict=True)]
         share[stands] = 1.0
+        share[~np.isfinite(share)] = 1.0
+        share[list(self.layout.silent)] = 1.0
         self.floor = self.floor * share[self.layout.axis]
         self.noise = self.noise * np.sqrt(share)
 

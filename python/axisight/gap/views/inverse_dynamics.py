@@ -100,7 +100,7 @@ class InverseView(View):
         super().__init__(
             "inverse_dynamics", robot, logs, settings, fitter, floor, self.filtering.cutoff_hz
         )
-        self.silent = tuple(silent)
+        self.silent = fitter.silent = tuple(silent)
         self.unfelt = other_controllers_of_targets(robot, logs)
 
     def _certain(self, logs: Sequence[Log], motions: Sequence[Motion], floor: Floor) -> list[Array]:

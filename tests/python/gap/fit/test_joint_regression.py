@@ -14,14 +14,16 @@ TRUE = np.array([2.0, -1.0])
 NOISE = np.array([0.1, 5.0])
 
 
-def regression(bounds=(-np.inf, np.inf), loose=(False, False)) -> JointRegression:
+def regression(
+    bounds=(-np.inf, np.inf), loose=(False, False), noise=NOISE, silent=()
+) -> JointRegression:
     """Of two parameters on two axes, the second of which is fifty times as noisy."""
     rng = np.random.default_rng(0)
     matrix, gradient, loss, axes, stretches = [], [], [], [], []
     for stretch in range(STRETCHES):
         for axis in range(AXES):
             columns = rng.normal(size=(ROWS, 2))
-            residual = NOISE[axis] * rng.normal(size=ROWS) - columns @ TRUE
+            residual = noise[axis] * rng.normal(size=ROWS) - columns @ TRUE
             matrix.append(columns.T @ columns)
             gradient.append(columns.T @ residual)
             loss.append(residual @ residual)
@@ -40,7 +42,11 @@ def regression(bounds=(-np.inf, np.inf), loose=(False, False)) -> JointRegressio
     )
     blocks = len(axes)
     layout = Layout(
-        np.array(axes), np.array(stretches), np.zeros(blocks, dtype=int), np.full(blocks, ROWS)
+        np.array(axes),
+        np.array(stretches),
+        np.zeros(blocks, dtype=int),
+        np.full(blocks, ROWS),
+        silent,
     )
     return JointRegression(at, layout, np.array(loose))
 
@@ -52,6 +58,13 @@ def test_a_noisy_axis_does_not_hide_the_others():
     np.testing.assert_allclose(found.step, TRUE, atol=4 * alone)
     # Twelve stretches tell a standard deviation to a fifth; twice that is allowed.
     np.testing.assert_allclose(found.deviation, alone, rtol=0.4)
+
+
+def test_an_axis_that_is_not_judged_has_no_weight():
+    found, other = (regression(noise=np.array([NOISE[0], x]), silent=(1,)) for x in NOISE)
+    np.testing.assert_array_equal(found.step, other.step)
+    loss = found.held_out()
+    assert found.weighed(loss, None) == found.weighed(loss, 0) == other.weighed(loss, None)
 
 
 def test_a_value_is_sure_where_the_stretches_agree():

@@ -10,8 +10,10 @@ import pytest
 
 from axisight import Diagnosis, Log, Settings, diagnose
 from axisight.gap import check_inputs, verdict_schema
+from axisight.gap.fit.time_limit import TimeLimit
 from axisight.gap.gate import silent_axes
 from axisight.gap.intake.prepared_logs import behind_gate
+from axisight.gap.search.search import search
 from rigid_arm import arm, log_of
 from spoiled_cases import Case, clean_arm, each, every, loop_case
 
@@ -80,6 +82,55 @@ def test_closed_loop_needs_all_torques() -> None:
     found = behind_gate(case.robot, case.estimation, case.validation, ())
     assert found.silent == (2,)
     assert found.view(Settings(threads=1)).mode == "inverse_dynamics"
+
+
+def parked(case: Case, axis: int) -> Case:
+    """Return the case with an axis (from 0) that rests, without torque."""
+    for field in ("position_rad", "velocity_ref_rad_s", "torque_nm"):
+        if getattr(case.logs[0], field) is not None:
+            case = every(case, field, axis, zeros)
+    return case
+
+
+def test_a_parked_axis_is_not_dead() -> None:
+    """It is judged in closed loop with the others."""
+    case = parked(clean_arm(), 1)
+    assert silent_axes(case.robot, case.logs) == ()
+    assert ("channel_constant", "flag", 2) in findings(case)
+    case = parked(loop_case(), 2)
+    found = behind_gate(case.robot, case.estimation, case.validation, ())
+    assert found.silent == ()
+    assert found.view(Settings(threads=1)).mode == "closed_loop"
+
+
+def test_a_dead_axis_may_park_in_some_logs() -> None:
+    case = every(clean_arm(), "torque_nm", 1, zeros)
+    case = replace(case, validation=parked(case, 1).validation)
+    assert silent_axes(case.robot, case.logs) == (1,)
+
+
+def test_a_search_knows_which_axes_are_not_judged() -> None:
+    case, settings = every(clean_arm(), "torque_nm", 1, zeros), Settings(threads=1)
+    view = behind_gate(case.robot, case.estimation, case.validation, ()).view(settings)
+    at_once = TimeLimit(1e-9)
+    found = search(
+        view.fitter, view.candidates, view.floor.expected, settings, lambda *_: None, at_once
+    )
+    assert found.layout.silent == (1,)
+
+
+def test_a_log_that_is_used_all_the_same_has_a_say() -> None:
+    """The gate and the comparison then set aside the same axes."""
+    clean = clean_arm()
+    case = every(clean, "torque_nm", 1, zeros)
+    position = clean.estimation[0].position_rad.copy()
+    position[500, 0] += 1.0
+    case = replace(
+        case, estimation=(replace(clean.estimation[0], position_rad=position), *case.estimation[1:])
+    )
+    found = check_inputs(case.robot, case.estimation, case.validation, despite=["position_spike"])
+    assert silent_axes(case.robot, case.logs) == ()
+    assert not any("not judged" in f.message for f in found)
 
 
 @functools.cache

@@ -43,6 +43,21 @@ def test_half_a_sample_is_found():
     assert "samples) later than they are logged" in found.says()
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_constant_torque_tells_nothing():
+    """It is that of a dead channel or of an axis at rest; the others tell the same as without it."""
+
+    def with_axis(value):
+        for log in logs():
+            torque = log.torque_nm.copy()
+            torque[:, 1] = value
+            yield replace(log, torque_nm=torque)
+
+    none, some = (torque_clock(robot(), list(with_axis(nm))) for nm in (0.0, 5.0))
+    assert none is not None
+    assert some == none
+
+
 def test_torques_on_the_clock_of_the_motion_are_left_alone():
     plain = [log_of(arm(), seed, seconds=30.0) for seed in (1, 2, 3)]
     assert torque_clock(arm(), plain) is None

@@ -199,6 +199,17 @@ def test_what_predicts_better_and_fits_no_better_is_no_cause():
     assert not earns(without=8.0, least=21.0)
 
 
+def test_the_floor_falls_only_where_a_judged_axis_has_a_finite_loss(monkeypatch):
+    """The second axis is not judged; on the third, the model has no prediction."""
+    none = np.zeros(3, int)
+    layout = Layout(np.arange(3), none, none, np.ones(3), silent=(1,))
+    monkeypatch.setattr(states, "held_out_loss", lambda model: np.array([1.0, 1.0, np.nan]))
+    state = states.SearchState(None, None, np.full(3, 4.0), layout, noise=np.ones(3))
+    state.refute_floor()
+    np.testing.assert_array_equal(state.floor, [1.0, 4.0, 4.0])
+    np.testing.assert_array_equal(state.noise, [0.5, 1.0, 1.0])
+
+
 def test_a_simulation_that_diverges_without_a_cause_needs_it():
     assert earns(without=None)
     assert not earns(without=None, within=True)
