@@ -192,9 +192,7 @@ def test_noise_that_one_axis_refutes_is_not_that_of_the_others(refuted, loud):
     floor = np.array([0.06, 0.05, 0.002, np.nan])
     gap = replace(gap_figures(seen), floor=np.sqrt(np.nanmean(floor**2)), floor_per_axis=floor)
     noise = np.array([*refuted, 1.0])
-    found = carried_over(
-        named(), seen, gap, NAMES, Settings(), differentiated=True, refuted=noise
-    )
+    found = carried_over(named(), seen, gap, NAMES, Settings(), differentiated=True, refuted=noise)
     assert (found.withdrawn is not None and found.withdrawn.why == "loud") == loud
 
 
