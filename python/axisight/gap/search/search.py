@@ -70,7 +70,8 @@ def search(
         causes = tuple(f.effect.label for f in out.model.free)
         out.stopped = Stop(limit.limit_s, out.number, limited.work.stage, causes)
         out.rounds = out.rounds or [Round((), (), out.left())]
-    out.refute_floor()
+    if fitter.adds_up:
+        out.refute_floor()
     fitter.work.stage = "measuring"
     return out
 
