@@ -39,7 +39,7 @@ def whining(seed: int) -> Log:
 def noise_alone(x: np.ndarray) -> Log:
     """Return a log of signals (n, 6) without motion."""
     time = np.arange(len(x)) / RATE_HZ
-    return replace(quiet(0), position_rad=np.zeros_like(x), torque_nm=x, time_s=time)
+    return replace(quiet(0), position_rad=np.zeros_like(x), torque_nm=x, time_s=time, axis_kinds=())
 
 
 @pytest.mark.parametrize("n", [1500, 4000, 20000])
