@@ -31,8 +31,8 @@ def at_their_poses(robot: Robot, logs: Sequence[Log]) -> list[Log]:
 
     It is not where logs start at different poses, or away from an operating point that the robot does not state.
     All logs at one pose away from a stated operating point are a finding of the gate instead. Nor is it where
-    encoders of motor and joint show a gear that is deflected further at the start than the simulator's. Motors count
-    as at rest at the first sample. Logs stay unchanged if the robot has no controller: it is not simulated along
+    encoders of motor and joint show an elastic gear that is deflected further at the start than the simulator's. Motors
+    count as at rest at the first sample. Logs stay unchanged if the robot has no controller: it is not simulated along
     them. A log with a run-up keeps the start that this has.
     """
     if robot.controller_kind == "none" or any(log.n_axes != robot.n_axes for log in logs):
@@ -59,7 +59,8 @@ def _at_its_pose(robot: Robot, log: Log, elsewhere: bool, deflected_rad: Array) 
     angle = start_of(robot, log.position_rad[0]) if elsewhere else np.array(robot.operating_point)
     motor = robot.equilibrium(angle.tolist())["motor_angle_rad"].values
     further = deflected_rad - (motor * robot.gear_ratio - angle)
-    behind = np.abs(further) > OFFSET_RAD
+    # Only a gear that gives way lets a joint stand elsewhere than its motor.
+    behind = (np.abs(further) > OFFSET_RAD) & ~np.array(robot.axis_is_rigid)
     if not elsewhere and not behind.any():
         return log
     return replace(log, start_rad=np.where(behind, angle - further, angle))

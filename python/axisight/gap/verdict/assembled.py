@@ -215,7 +215,7 @@ def _concluded(
         removed,
         steps > 0,
         differentiated=view.mode == "inverse_dynamics",
-        refuted=float(np.min(found.noise)),
+        refuted=found.noise,
         gears=gears,
     )
     measured = [view.measured(log) for log in held_logs]

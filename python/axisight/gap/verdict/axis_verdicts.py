@@ -24,6 +24,7 @@ An axis has a gap where one of these holds:
 |---|---|
 | a validation log stands above what passes for the floor | as `carry_over.above_floor` |
 | the simulation of a validation log broke off | |
+| both encoders contradict its gear, and the verdict was withdrawn for that | as `carry_over.carried_over` |
 | the residual of the estimation logs has an excess, and the validation logs a gap | 0.3; 10 % above the floor |
 | the same excess is too large for noise of another colour, by inverse dynamics | 1.0 |
 
@@ -53,7 +54,8 @@ class AxisEvidence:
 
     ``excess`` and ``explained`` as in `AxisVerdict`; ``refitted``, ``after`` and ``floor`` as in `Gap`;
     ``above``: whether a validation log stands above what passes for the floor; ``left``: whether the causes leave
-    a gap of at least twice the floor; ``silent``: whether its torque carries nothing.
+    a gap of at least twice the floor; ``silent``: whether its torque carries nothing; ``gear``: whether the verdict was
+    withdrawn because both encoders contradict its gear.
     """
 
     excess: float
@@ -64,6 +66,7 @@ class AxisEvidence:
     above: bool = False
     left: bool = False
     silent: bool = False
+    gear: bool = False
 
     @property
     def quiet(self) -> bool:
@@ -76,7 +79,8 @@ class AxisEvidence:
             return False
         seen = self.excess > settings.largest_scatter and not self.quiet
         broke_off = not np.isfinite(self.refitted)
-        return self.above or seen or broke_off or (own_residual and self.excess > OF_COLOUR)
+        colour = own_residual and self.excess > OF_COLOUR
+        return self.above or self.gear or seen or broke_off or colour
 
 
 @dataclass(frozen=True)
@@ -199,9 +203,20 @@ def with_axes_agreed(
         left.tolist(),
         strict=True,
     )
-    silent = stages.given.silent
+    silent, why = stages.given.silent, conclusion.withdrawn
+    gear = None if why is None or why.why != "gear" else why.axis
     evidence = [
-        AxisEvidence(a.excess, a.explained, before, after, floor, above, left, a.axis - 1 in silent)
+        AxisEvidence(
+            a.excess,
+            a.explained,
+            before,
+            after,
+            floor,
+            above,
+            left,
+            silent=a.axis - 1 in silent,
+            gear=a.axis == gear,
+        )
         for a, before, after, floor, above, left in figures
     ]
     still_open = {x for group in open_groups(conclusion, len(evidence)) for x in group}

@@ -52,7 +52,7 @@ def carried_over(
     stepped: NDArray[np.bool_] | None = None,
     *,
     differentiated: bool = False,
-    refuted: float = 1.0,
+    refuted: Array | float = 1.0,
     gears: GearErrors | None = None,
 ) -> Conclusion:
     """Return the conclusion, or *unknown* with the reason where the validation logs contradict it.
@@ -70,8 +70,8 @@ def carried_over(
     - ``removed``: share of the validation residual above noise that the causes remove; None if unknown.
     - ``differentiated``: whether torques are predicted from differentiated positions. Their noise lies in the band
       that is compared, so that no average over the log removes it.
-    - ``refuted``: factor by which the model lowered the noise of the estimation logs [1]. Noise as large as the torque
-      is no less doubtful for that.
+    - ``refuted`` (n_axes,): factors by which the model lowered the noise of the estimation logs [1]. Noise as large as
+      the torque is no less doubtful for that.
     - ``gears``: errors of gears. Causes of one gear that remove its errors need not shrink a gap near the floor.
     - ``stepped`` (n_axes,): axes whose noise comes from encoder steps; none by default.
     """
@@ -79,7 +79,7 @@ def carried_over(
     labels = tuple(cause.label for cause in conclusion.causes)
     if gap.refitted > _SEEN and gap.floor > _ABSURD * gap.refitted:
         withdrawn = Withdrawal("noise", gap.before, gap.refitted, gap.floor)
-    elif differentiated and hides_all(gap.floor / refuted):
+    elif differentiated and hides_all(_estimated(gap, refuted)):
         withdrawn = Withdrawal("loud", gap.before, gap.refitted, gap.floor)
     elif own is not None:
         # Another motion may show more of what no effect explains, and as much of the causes.
@@ -107,6 +107,11 @@ def carried_over(
         next_experiment=_advice(withdrawn),
         withdrawn=withdrawn,
     )
+
+
+def _estimated(gap: Gap, refuted: Array | float) -> float:
+    """Return the floor of the arm [1] as it was before the model refuted that of single axes."""
+    return float(np.sqrt(np.nanmean((gap.floor_per_axis / refuted) ** 2)))
 
 
 def _mend_gears(conclusion: Conclusion, gears: GearErrors | None, settings: Settings) -> bool:

@@ -6,7 +6,7 @@ import pytest
 from axisight import Effect, InputError, Settings
 from axisight.fitting.divergence import Diverged, must_hold
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
-from axisight.gap.fit.time_limit import TimeLimit
+from axisight.gap.fit.time_limit import TimeLimit, TimeUp
 from axisight.gap.screening.screening import ScreeningModel
 from axisight.gap.search.search import search
 from axisight.gap.views.closed_loop import ClosedLoopView
@@ -50,6 +50,25 @@ def test_a_search_does_not_pass_over_misuse():
             lambda *_: None,
             TimeLimit.none(),
         )
+
+
+@pytest.mark.parametrize("adds_up", [True, False])
+def test_the_model_refutes_a_floor_where_errors_of_axes_add_up(
+    view: ClosedLoopView, model: FittedModel, adds_up: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """In closed loop, noise of sensors is that of the loop, whatever a model leaves."""
+    monkeypatch.setattr(view.fitter, "adds_up", adds_up)
+    loud = 1e9 * view.floor.expected
+
+    def ends(found: FittedModel) -> list[Hypothesis]:
+        raise TimeUp
+
+    found = search(
+        view.fitter, ends, loud, view.settings, lambda *_: None, TimeLimit.none(), baseline=model
+    )
+    assert np.all(found.noise < 1.0) == adds_up
+    stays = found.floor == pytest.approx(loud[model.axis] * model.samples)
+    assert stays != adds_up
 
 
 def test_misuse_comes_through_a_screen(view: ClosedLoopView, model: FittedModel):

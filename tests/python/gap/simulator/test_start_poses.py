@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -116,6 +117,62 @@ def test_a_robot_without_a_stated_pose_starts_where_its_logs_do(robot: Robot) ->
     assert starts_of(free, at_their_poses(free, rest)) is None
     stated = free.with_operating_point(robot.operating_point)
     assert starts_of(stated, at_their_poses(stated, logs)) is None
+
+
+LEVER = """
+schema = "axisight.robot/2"
+name = "lever"
+gravity = [0.0, 0.0, -9.81]
+sample_time = 0.002
+
+[[joint]]
+name = "lever"
+kind = "driven"
+motion = "revolute"
+origin = [0.0, 0.0, 0.0]
+axis = [0.0, 1.0, 0.0]
+
+[joint.link]
+mass = 1.5
+com = [0.0, 0.0, -0.2]
+inertia = [0.01, 0.01, 0.001, 0.0, 0.0, 0.0]
+
+[joint.drive]
+gear_ratio = 1.0
+motor_inertia = 0.06
+viscous_friction = 0.8
+
+[controller]
+kind = "pd_position"
+kp = [150.0]
+kd = [6.0]
+velocity_feedforward = false
+
+[sensor]
+position_noise_std = 2e-5
+"""
+ELASTIC = LEVER.replace("[joint.link]", "stiffness = 250.0\ndamping = 1.0\n\n[joint.link]")
+
+
+@pytest.mark.parametrize(("text", "start"), [(ELASTIC, [-0.05]), (LEVER, None)])
+def test_a_rigid_gear_starts_where_its_motor_does(tmp_path, text, start) -> None:
+    """Whatever its joint encoder shows; behind an elastic gear the joint starts where it stood."""
+    path = tmp_path / "lever.toml"
+    path.write_text(text, "utf-8")
+    lever = load_robot(path)
+    wave = np.sin(np.pi * lever.sample_time_s * np.arange(4000))[:, None]
+    log = Log(
+        name="swings",
+        source=Path("swings.parquet"),
+        sample_time_s=lever.sample_time_s,
+        time_s=lever.sample_time_s * np.arange(4000),
+        position_rad=0.4 * wave,
+        torque_nm=wave,
+        velocity_ref_rad_s=wave,
+        joint_position_rad=0.4 * wave - np.where(wave > 0, -0.05, 0.05),
+    )
+    (found,) = at_their_poses(lever, [log])
+    assert found.start_rad == (None if start is None else pytest.approx(start, abs=1e-3))
 
 
 def test_residuals_are_those_of_a_robot_that_starts_there(robot: Robot) -> None:

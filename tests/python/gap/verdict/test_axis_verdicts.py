@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from axisight import Settings
 from axisight.gap.facts.axis_names import at_floor, verdict_word
 from axisight.gap.facts.result import AxisVerdict, Candidate, Cause, Interval
-from axisight.gap.measure.gap_figures import Stage, Stages
+from axisight.gap.facts.withdrawal import Withdrawal
+from axisight.gap.measure.gap_figures import Stage, Stages, gap_figures
 from axisight.gap.measure.where import BAND_EDGES_HZ
 from axisight.gap.verdict.assembled import _places
 from axisight.gap.verdict.axis_verdicts import (
@@ -22,6 +23,7 @@ from axisight.gap.verdict.axis_verdicts import (
     AxisEvidence,
     axis_verdicts,
     verdict_told,
+    with_axes_agreed,
 )
 from axisight.gap.verdict.carry_over import far_above_floor
 from axisight.gap.verdict.conclusion import AxisStanding, Conclusion
@@ -255,6 +257,15 @@ def test_by_inverse_dynamics_the_residual_of_an_axis_is_its_own():
 def test_an_explained_axis_in_words(row, word):
     assert verdict_word("explained", row) == word
     assert verdict_word("explained_in_part", row) == "explained in part"
+
+
+def test_the_gear_that_both_encoders_contradict_is_the_unknown_axis():
+    """Whatever axis stands highest above its floor; the headline names the axis of the gear."""
+    axes = (AxisVerdict(1, "none", 0.0, 0.0, ()), AxisVerdict(2, "none", 0.1, 0.0, ()))
+    seen = Stages(*(stage_of([1.0, x]) for x in (1.1, 1.1, 1.1, 1.0)))
+    contradicted = replace(of_arm("unknown", axes), withdrawn=Withdrawal("gear", axis=1, share=9.0))
+    found = with_axes_agreed(contradicted, seen, gap_figures(seen), SETTINGS, own_residual=False)
+    assert [a.verdict for a in found.axes] == ["unknown", "none"]
 
 
 LEFT = replace(REMOVED, after=0.2, left=True)

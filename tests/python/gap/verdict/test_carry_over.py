@@ -182,6 +182,20 @@ def test_noise_as_large_as_the_torque_allows_no_verdict(noise, differentiated):
         assert found.next_experiment.startswith("Lower the cutoff")
 
 
+@pytest.mark.parametrize(
+    ("refuted", "loud"), [([1.0, 1.0, 0.05], False), ([0.05, 1.0, 1.0], True), ([1.0] * 3, False)]
+)
+def test_noise_that_one_axis_refutes_is_not_that_of_the_others(refuted, loud):
+    """Twenty times 0.2 % beside 5 % is little; twenty times 6 % is more than the torque of one axis."""
+    seen = stages(0.5, 0.06)
+    # The last axis is not judged.
+    floor = np.array([0.06, 0.05, 0.002, np.nan])
+    gap = replace(gap_figures(seen), floor=np.sqrt(np.nanmean(floor**2)), floor_per_axis=floor)
+    noise = np.array([*refuted, 1.0])
+    found = carried_over(named(), seen, gap, NAMES, Settings(), differentiated=True, refuted=noise)
+    assert (found.withdrawn is not None and found.withdrawn.why == "loud") == loud
+
+
 def test_a_gap_that_nobody_sees_is_below_whatever_noise():
     """A simulation diagnosed by itself: sharp motions pass for noise, and nothing is missing."""
     nothing = replace(named(), verdict="none", causes=(), effects=())
