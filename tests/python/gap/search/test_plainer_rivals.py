@@ -29,9 +29,9 @@ UNEVEN, SIDED, PLAIN, ELSEWHERE = (
     [
         # Of the cause, and of a rival.
         (UNEVEN, [SIDED], [PLAIN], [PLAIN, SIDED]),
-        (ranked("torque_offset"), [SIDED], [PLAIN], [PLAIN, SIDED]),
-        # The cause itself is the plainer law; another axis has one of its own; nobody tried one.
-        (PLAIN, [SIDED], [PLAIN], [PLAIN, SIDED]),
+        (ranked("torque_offset"), [SIDED, UNEVEN], [PLAIN], [SIDED, PLAIN, UNEVEN]),
+        # A law without a plainer one; another axis has one of its own; nobody tried one.
+        (SIDED, [], [PLAIN], []),
         (UNEVEN, [SIDED], [ELSEWHERE], [SIDED]),
         (UNEVEN, [], [], []),
     ],
