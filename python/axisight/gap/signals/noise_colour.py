@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from axisight.errors import InputError
 from axisight.gap.signals.noise import segment_of
 from axisight.logs import Log
 from axisight.statistics.spectral_density import welch
@@ -48,16 +49,24 @@ def noise_colour(log: Log, x: Array, above_hz: float) -> NoiseColour:
     The noise is white, as large as the top fifth of the spectrum, unless the density between ``above_hz`` and the top
     rises with frequency: the Bayesian information criterion decides (Schwarz 1978, Annals of Statistics 6(2)). Dry
     friction breaks a torque at every reversal, which adds power everywhere. The estimate is therefore limited to that
-    from sample-to-sample differences without the largest ones.
+    from sample-to-sample differences without the largest ones. A log too short for a frequency in the top fifth has its
+    highest one for it. Raises InputError for fewer than six samples: there is none.
     """
     rate = 1.0 / log.sample_time_s
     segment = segment_of(log)
     f, density = welch(x, rate, segment)
     density *= rate / 2
-    top = (f > 0.4 * rate) & (f < 0.49 * rate)
+    known = (f > 0.0) & (f < 0.49 * rate)
+    if not known.any():
+        raise InputError(
+            f"{log.name}: samples: expected at least 6 to tell noise from motion, got {log.n_samples}"
+        )
+    top = known & (f > 0.4 * rate)
+    if not top.any():
+        top = f == f[known].max()
     # A tenth of the rate: below it, a log of many samples has few of its frequencies.
     low = min(max(above_hz, 0.1 * rate), 0.4 * rate)
-    seen = (f > low) & (f < 0.49 * rate)
+    seen = known & (f > low) | top
     gain = (2 * np.sin(np.pi * f / rate)) ** 2
     white, stepwise = density[top].mean(axis=0), np.zeros(x.shape[1])
     for axis in range(x.shape[1]):
@@ -87,6 +96,9 @@ def _rising(density: Array, gain: Array, segments: float) -> tuple[float, float]
     whole = float(y.mean())
     if not whole > 0.0:
         return 0.0, 0.0
+    if count == 1:
+        # One band is white and rising alike.
+        return whole, 0.0
     model, found = np.full(count, whole), np.zeros(2)
     for _ in range(10):
         found, _ = scipy.optimize.nnls(columns / model[:, None], y / model)

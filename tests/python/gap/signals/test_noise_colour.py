@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from axisight import Log, Settings, diagnose
+from axisight import InputError, Log, Settings, diagnose
 from axisight.gap.signals.motion import Filtering
 from axisight.gap.signals.noise_colour import noise_colour
 from axisight.gap.simulator.inverse_noise import InverseNoise
@@ -39,7 +39,7 @@ def whining(seed: int) -> Log:
 def noise_alone(x: np.ndarray) -> Log:
     """Return a log of signals (n, 6) without motion."""
     time = np.arange(len(x)) / RATE_HZ
-    return replace(quiet(0), position_rad=np.zeros_like(x), torque_nm=x, time_s=time)
+    return replace(quiet(0), position_rad=np.zeros_like(x), torque_nm=x, time_s=time, axis_kinds=())
 
 
 @pytest.mark.parametrize("n", [1500, 4000, 20000])
@@ -51,6 +51,24 @@ def test_white_noise_stays_white(n: int) -> None:
     assert np.sum([x.stepwise > 0 for x in found]) <= 2
     # Scatter of the top fifth: some 40 frequencies of the shortest log.
     assert np.mean([x.white for x in found]) == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("above_hz", [10.0, 40.0])
+@pytest.mark.parametrize("n", [6, 7, 8, 9, 10, 16, 20, 21])
+def test_short_logs_have_noise_too(n: int, above_hz: float) -> None:
+    """A log of 21 samples has no frequency in the top fifth of its spectrum."""
+    log = noise_alone(np.random.default_rng(n).normal(size=(n, 300)))
+    found = noise_colour(log, log.torque_nm, above_hz)
+    assert not found.stepwise.any()
+    # Mean of three hundred roots of two to six squares: up to a fifth less than the root of the mean square, and less
+    # by what the differences without their largest ones leave out.
+    assert 0.6 < found.white.mean() < 1.05
+
+
+def test_a_log_without_frequencies_is_refused_by_name() -> None:
+    log = replace(noise_alone(np.zeros((5, 6))), name="blink")
+    with pytest.raises(InputError, match=r"blink: samples: expected at least 6 .* got 5"):
+        noise_colour(log, log.torque_nm, 20.0)
 
 
 def test_a_differentiated_encoder_is_told_from_white_noise() -> None:
