@@ -21,9 +21,8 @@ _DIFFERS = "sample_time_differs"
 
 def check_machine(robot: Robot, logs: Sequence[Log]) -> list[Finding]:
     """Return findings about axes, sample times, gear ratios and ranges of joints."""
-    out = _gears(robot)
+    out = [*_gears(robot), *check_ranges(robot, logs)]
     for log in logs:
-        out += check_ranges(robot, log)
         if log.n_axes != robot.n_axes:
             message = (
                 f"expected {robot.n_axes} axes as in the robot, got {log.n_axes}. Use the robot file of this "

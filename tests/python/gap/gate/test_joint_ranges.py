@@ -1,5 +1,6 @@
 """Logs beyond the range of a joint that a model file states are flagged, and nothing else is."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,10 +62,34 @@ def test_what_passes_the_range_is_flagged(
     lever: Robot, low: float, high: float, target: float | None, fields: list[str]
 ) -> None:
     """By more than 0.02 rad: a hard stop gives way by less."""
-    found = check_ranges(lever, log_of(low, high, target))
+    found = check_ranges(lever, [log_of(low, high, target)])
     assert [f.field for f in found] == fields
     assert {f.name for f in found} <= {"range_passed"}
     assert {f.severity for f in found} <= {"flag"}
     assert [
         f for f in check_machine(lever, [log_of(low, high, target)]) if f.field in fields
     ] == found
+
+
+def test_an_axis_has_one_flag_with_the_extremes_of_all_logs(lever: Robot) -> None:
+    """In the unit of the axis, at the log and column that go furthest."""
+    logs = [replace(log_of(*at), name=name) for name, at in RUNS.items()]
+    (found,) = check_ranges(lever, logs)
+    assert (found.log, found.axis, found.field) == ("third", 1, "position_ref_1")
+    assert "-1 to 0.5 rad, got -1.2 to 0.8 rad over all logs" in found.message
+
+
+RUNS = {"first": (-1.2, 0.4, None), "second": (-0.9, 0.6, 0.1), "third": (-0.9, 0.5, 0.8)}
+SLIDE = URDF.replace("revolute", "prismatic")
+
+
+@pytest.mark.parametrize(("high", "passes"), [(0.52, False), (0.54, True)])
+def test_an_axis_that_slides_passes_its_range_by_metres(
+    tmp_path: Path, high: float, passes: bool
+) -> None:
+    """By more than 2 % of its travel of 1.5 m, as an angle does by more than 2 % of a radian."""
+    path = tmp_path / "slide.urdf"
+    path.write_text(SLIDE, "utf-8")
+    found = check_ranges(load_robot(path), [log_of(-0.9, high)])
+    assert len(found) == passes
+    assert all(f"got -0.9 to {high} m over all logs" in f.message for f in found)
