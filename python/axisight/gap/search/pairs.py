@@ -37,13 +37,15 @@ _HINT = 0.2
 class Pair:
     """Two effects that are causes of ``axis`` (from 0) together: ``both`` in one fit.
 
-    ``gain``: fall of the held-out loss there; ``members``: each with its posterior beside the other.
+    ``gain``: fall of the held-out loss there; ``members``: each with its posterior beside the other;
+    ``without``: the model without each, which has the other alone.
     """
 
     axis: int
     both: FittedHypothesis
     gain: float
     members: tuple[Found, Found]
+    without: tuple[FittedModel, FittedModel]
 
 
 class Pairs:
@@ -95,7 +97,10 @@ class Pairs:
             return None
         one = self._beside(best[0], best[1], mine, axis)
         other = self._beside(best[1], best[0], mine, axis)
-        return Pair(axis, both, gain, (one, other)) if one and other else None
+        if one is None or other is None:
+            return None
+        alone = {t.label: t.fitted for t in mine}
+        return Pair(axis, both, gain, (one, other), (alone[best[1]], alone[best[0]]))
 
     def _hints(self, t: FittedHypothesis, axis: int, left: float) -> bool:
         """Whether a candidate of ``axis`` explains some of the loss ``left`` there and is no sample and hold."""

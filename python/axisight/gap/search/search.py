@@ -86,6 +86,7 @@ def _add_causes(
     """Add causes round by round until a round finds none."""
     refused: set[str] = set()
     kept = ColumnCache()
+    together: bool | Diverged = True
 
     def offered_beside(model: FittedModel) -> list[Hypothesis]:
         return fresh(candidates(model), model, refused)
@@ -107,8 +108,10 @@ def _add_causes(
         )
         offered = candidates(out.model)
         options = fresh(offered, out.model, refused)
-        if _took_ordinary(fitter, options, out, settings, round_, progress):
-            continue
+        if not isinstance(together, Diverged):
+            together = _took_ordinary(fitter, options, out, settings, round_, progress)
+            if together is True:
+                continue
         trials = round_.refined(round_.run(options, number), options, number)
         standings, taken = _judged(round_, trials, out, settings, len(options))
         if round_.first(standings, trials) not in {r.trial.label for r, _ in taken}:
@@ -144,8 +147,11 @@ def _took_ordinary(
     settings: Settings,
     round_: SearchRound,
     progress: Progress,
-) -> bool:
-    """Add what every machine has and the simulator does not tell, on all axes at once; return whether there is any."""
+) -> bool | Diverged:
+    """Add what every machine has and the simulator does not tell, on all axes at once; return whether there is any.
+
+    Where the model diverges with it, nothing is added: return how.
+    """
     fitter.work.stage = "screening"
     bodies = FreeBodies(fitter, out.layout, settings, FreeBodies.among(options))
     together = OrdinaryTogether(out.model, out.floor, bodies)
@@ -154,8 +160,10 @@ def _took_ordinary(
         return False
     standings = tuple({s.axis: s for _, s in taken}.values())
     left = out.left()
-    if _take_in(round_, out, taken, progress) is not None:
-        return False
+    diverged = _take_in(round_, out, taken, progress)
+    if diverged is not None:
+        out.skipped[" + ".join(r.trial.label for r, _ in taken)] = str(diverged)
+        return diverged
     out.rounds.append(Round(standings, taken, left))
     out.bodies = out.bodies or bodies
     return True
@@ -296,7 +304,7 @@ def _pairs(
         round_.fitter, state.model, trials, round_.current, state.floor, state.layout, settings
     )
     found = [pairs.found(axis, float(first[axis]), tried) for axis in range(state.layout.n_axes)]
-    seen = [p for p in found if p is not None and _each_allowed(p, trials, state)]
+    seen = [p for p in found if p is not None and _each_allowed(p, state)]
     seen.sort(key=lambda p: -p.gain)
     fall = falls([p.both for p in seen], round_.current, state.layout)
     kept: list[int] = []
@@ -374,13 +382,10 @@ def _allowed(one: FittedHypothesis, state: SearchState, beside: FittedModel | No
     return state.bodies is None or state.bodies.allow(one, beside or state.model)
 
 
-def _each_allowed(pair: Pair, trials: Sequence[FittedHypothesis], state: SearchState) -> bool:
+def _each_allowed(pair: Pair, state: SearchState) -> bool:
     """Whether each of a pair may be a cause beside the other."""
-    fitted = {t.label: t.fitted for t in trials}
-    (one, _), (other, _) = pair.members
-    return _allowed(one.trial, state, fitted.get(other.trial.label)) and _allowed(
-        other.trial, state, fitted.get(one.trial.label)
-    )
+    each = zip(pair.members, pair.without, strict=True)
+    return all(_allowed(one.trial, state, beside) for (one, _), beside in each)
 
 
 def _take_in(

@@ -42,3 +42,10 @@ def test_friction_larger_one_way_gives_way_to_its_parts_where_it_is_at_its_bound
     assert [p.label for p in partners] == tried
     # Each by itself, on the model without the composite.
     assert all(len(p.fitted.free) == 1 for p in partners)
+    # Of two that are causes together, each is judged beside the other alone, parts of a composite as well.
+    found = pairs.found(2, float((current - floor)[layout.axis == 2].sum()), len(options))
+    assert (found is not None) == (len(tried) == 2)
+    if found is not None:
+        members = [r.trial.label for r, _ in found.members]
+        assert sorted(members) == tried
+        assert [[e.label for e in m.effects] for m in found.without] == [[x] for x in members[::-1]]

@@ -15,6 +15,7 @@ from axisight.gap.screening.screening import Start
 from axisight.gap.screening.search_round import SearchRound
 from axisight.gap.search import moves, search
 from axisight.gap.search import state as states
+from axisight.gap.search.pairs import Pair
 from gap_data import linear_evidence
 
 
@@ -202,3 +203,73 @@ def test_what_predicts_better_and_fits_no_better_is_no_cause():
 def test_a_simulation_that_diverges_without_a_cause_needs_it():
     assert earns(without=None)
     assert not earns(without=None, within=True)
+
+
+def test_each_of_a_pair_is_judged_beside_its_partner():
+    """Also where the partner is a part of a composite, which no round has tried by itself."""
+    asked = []
+
+    class Bodies:
+        def allow(self, one, model):
+            asked.append((one, model))
+            return True
+
+    members = tuple((SimpleNamespace(trial=name), None) for name in ("friction", "offset"))
+    pair = Pair(0, None, 1.0, members, ("with offset", "with friction"))
+    assert search._each_allowed(pair, SimpleNamespace(bodies=Bodies(), model="neither"))
+    assert asked == [("friction", "with offset"), ("offset", "with friction")]
+
+
+def test_what_diverges_together_is_told_and_not_tried_again(monkeypatch):
+    """Two rounds: the second begins after a cause that the first found by itself."""
+    ordinary, cause = (
+        (SimpleNamespace(trial=SimpleNamespace(label=label)), SimpleNamespace(axis=0))
+        for label in ("coulomb_friction@1", "backlash@1")
+    )
+    judged = iter([(cause,), ()])
+    tried = []
+
+    class Together:
+        def __init__(self, *_):
+            pass
+
+        def found(self, options):
+            tried.append(options)
+            return [ordinary]
+
+    class Trials:
+        skipped, sensitivities = {}, {}
+
+        def __init__(self, *_):
+            pass
+
+        def run(self, *_):
+            return []
+
+        def run_waiting(self, *_):
+            return []
+
+        def refined(self, *_, **__):
+            return []
+
+        def first(self, *_):
+            return "backlash@1"
+
+    def take_in(round_, state, taken, progress):
+        return Diverged("diverged at sample 5") if ordinary in taken else None
+
+    monkeypatch.setattr(search, "OrdinaryTogether", Together)
+    monkeypatch.setattr(search, "SearchRound", Trials)
+    monkeypatch.setattr(search, "_judged", lambda *_: ((), next(judged)))
+    monkeypatch.setattr(search, "_take_in", take_in)
+    monkeypatch.setattr(search, "make", lambda *_: set())
+    monkeypatch.setattr(search, "_settled", lambda *_: False)
+    x = np.ones((40, 1))
+    model = linear_evidence(x, x[:, 0], np.repeat([0, 1], 20))
+    layout = Layout(*[np.zeros(2, int)] * 3, np.ones(2))
+    state = states.SearchState(model, model, np.zeros(2), layout)
+    fitter = SimpleNamespace(work=SimpleNamespace())
+    search._add_causes(fitter, lambda _: [], state, Settings(), lambda *_: None)
+    assert len(state.rounds) == 2
+    assert len(tried) == 1
+    assert state.skipped == {"coulomb_friction@1": "the simulation failed: diverged at sample 5"}
