@@ -65,7 +65,8 @@ def lacks(fitter: ModelFitter, effect: Effect) -> bool:
 def unsaid(fitter: ModelFitter) -> frozenset[str]:
     """Return the names of effects of every machine of which the simulator says nothing, or the same of every axis.
 
-    A model file leaves them out, or fills in a number. Empty for a single axis, and in closed loop.
+    A model file leaves them out, or fills in a number. One that tells a law of friction by axis tells friction: another
+    law of it would stand for what is missing of the first. Empty for a single axis, and in closed loop.
     """
     axes = fitter.robot.axis_numbers()
     if not fitter.adds_up or len(axes) < 2:
@@ -75,7 +76,8 @@ def unsaid(fitter: ModelFitter) -> frozenset[str]:
         for name in effect_table()
         if on_every_machine(name)
     }
-    return frozenset(name for name, values in stated.items() if len(values) == 1)
+    told = {effect_info(name).family for name, values in stated.items() if len(values) > 1}
+    return frozenset(name for name in stated if effect_info(name).family not in told)
 
 
 def _none_stated(effect: Effect, fitter: ModelFitter) -> bool:
