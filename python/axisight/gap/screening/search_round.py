@@ -68,7 +68,7 @@ _FELT = 0.2
 def fresh(options: Sequence[Hypothesis], model: FittedModel, refused: set[str]) -> list[Hypothesis]:
     """Return the candidates that the model neither has nor contains, and that were not refused.
 
-    None contains a cause that is sure by itself, which it would replace.
+    None contains a cause that is sure by itself, which it would replace, unless it is a richer law of the same.
     """
     present = {e.label for e in model.effects}
     sure = {(f.effect.name, f.effect.axis) for f in model.free if f.sure}
@@ -78,8 +78,14 @@ def fresh(options: Sequence[Hypothesis], model: FittedModel, refused: set[str]) 
         for o in options
         if o.effect.label not in present | refused
         and (o.effect.name, o.effect.axis) not in contained
-        and sure.isdisjoint((x, o.effect.axis) for x in effect_info(o.effect.name).contains)
+        and sure.isdisjoint((x, o.effect.axis) for x in _besides_plainer(o.effect.name))
     ]
+
+
+def _besides_plainer(name: str) -> list[str]:
+    """Return the effects that one contains, without the plainer law that it adds to."""
+    info = effect_info(name)
+    return [x for x in info.contains if info.plainer is None or x != info.plainer.law]
 
 
 def _share_without_waiting(start: Start) -> float:

@@ -134,13 +134,15 @@ def test_no_friction_is_negative_in_total():
 
 
 def test_a_sure_cause_keeps_its_interval_and_its_place():
-    """No richer law of the same axis takes the place of a cause that holds for any bodies."""
+    """Of the laws that contain a cause that holds for any bodies, only those that add to it may take its place."""
     sure = Hypothesis(
         Effect("coulomb_friction", 2), ("coulomb_nm",), sure={"coulomb_nm": (1.0, 2.0)}
     )
     model = SimpleNamespace(effects=(sure.effect,), free=(sure,))
+    other = [Hypothesis(Effect("asymmetric_friction", axis), ()) for axis in (2, 3)]
     richer = [Hypothesis(Effect("stribeck_friction", axis), ()) for axis in (2, 3)]
     assert sure.limits("coulomb_nm") == (1.0, 2.0)
-    assert [h.effect.axis for h in fresh(richer, model, set())] == [3]
+    assert [h.effect.axis for h in fresh(other, model, set())] == [3]
+    assert [h.effect.axis for h in fresh(richer, model, set())] == [2, 3]
     plain = SimpleNamespace(effects=(sure.effect,), free=(replace(sure, sure={}),))
     assert [h.effect.axis for h in fresh(richer, plain, set())] == [2, 3]
