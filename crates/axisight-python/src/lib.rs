@@ -13,6 +13,7 @@ mod fit_results;
 mod fit_specs;
 mod frequency_fit;
 mod frf;
+mod joints;
 mod local_models;
 mod montecarlo;
 mod own_pool;

@@ -3,14 +3,14 @@
 use crate::convert::{array1, array2, array3, matrix, rows};
 use crate::effects::{EffectTuple, settings, tuple};
 use crate::entry::{AxisightError, RobotError, input_error};
+use crate::joints::joint_entry;
 use axisight_core::plant::{
-    Linearization, assemble, equilibrium, linearize, stable, zoh_frequency_response,
+    Linearization, assemble, equilibrium, linearize, stable_substeps, zoh_frequency_response,
 };
 use axisight_core::robot::{
     Controller, Joint, Known, Motion, Parameter, RigidBody, RobotDescription, ShapeError,
 };
 use axisight_core::robot_file::read_robot;
-use axisight_core::simulation::Method;
 use axisight_identification::frequency::modes;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -47,23 +47,6 @@ type ModeArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
     Matrix3<'py>,
 );
-
-/// Description of a joint, with the changes made since.
-fn joint_entry<'py>(py: Python<'py>, joint: &Joint) -> PyResult<Bound<'py, PyDict>> {
-    let out = PyDict::new(py);
-    out.set_item("name", &joint.name)?;
-    out.set_item("prismatic", joint.motion == Motion::Prismatic)?;
-    out.set_item("origin", joint.origin)?;
-    out.set_item("axis", joint.axis)?;
-    let spring = joint.compliance.as_ref();
-    out.set_item("spring", spring.map(|s| (s.stiffness, s.damping)))?;
-    let link = joint.link.as_ref();
-    out.set_item("link", link.map(|l| (l.mass, l.com, l.inertia)))?;
-    let drive = joint.drive.as_ref();
-    let drive = drive.map(|d| (d.gear_ratio, d.motor_inertia, d.viscous_friction));
-    out.set_item("drive", drive)?;
-    Ok(out)
-}
 
 impl Robot {
     fn linear(&self, effects: Vec<EffectTuple>, at: Option<Vec<f64>>) -> PyResult<Linearization> {
@@ -533,12 +516,7 @@ impl Robot {
 
     /// Steps of Runge-Kutta per sample that stay stable near standstill.
     fn stable_substeps(&self, effects: Vec<EffectTuple>) -> PyResult<usize> {
-        let once = Method::RungeKutta4 { substeps: 1 };
-        let found = stable(once, &self.description, &settings(effects)).map_err(input_error)?;
-        Ok(match found {
-            Method::RungeKutta4 { substeps } => substeps,
-            _ => 1,
-        })
+        stable_substeps(&self.description, &settings(effects)).map_err(input_error)
     }
 
     #[pyo3(signature = (effects, joint_angle=None))]

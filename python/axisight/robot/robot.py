@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from importlib import import_module, resources
 from pathlib import Path
 from typing import Literal
 
@@ -14,15 +13,12 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
-from axisight.arguments import did_you_mean, instance, positive, usable_path
+from axisight.arguments import did_you_mean, instance, positive
 from axisight.display import html
-from axisight.documents import read_text
 from axisight.effects import Effect, core_effects, effect_of_core
-from axisight.errors import InputError, RobotError
+from axisight.errors import InputError
 from axisight.robot.axis_names import axis_number, effect_on
 from axisight.robot.description import Joint, joint_of
-from axisight.robot.presets import PRESETS
-from axisight.robot.sources import is_model_file, refuse_neither
 
 Array = NDArray[np.float64]
 
@@ -350,12 +346,14 @@ class Robot:
         return out
 
     def with_sample_time(self, sample_time_s: float) -> Robot:
-        """Return the same robot with another sample time [s].
+        """Return the same robot with another sample time [s], and the control loop that its file states.
 
-        Raises InputError unless the sample time is positive.
+        Raises InputError unless the sample time is positive, and the file states one on a line of its own.
         """
         seconds = positive("sample_time_s", sample_time_s)
-        text = _SAMPLE_TIME.sub(f"sample_time = {seconds!r}", self.core.toml, count=1)
+        text, found = _SAMPLE_TIME.subn(f"sample_time = {seconds!r}", self.core.toml, count=1)
+        if not found:
+            raise InputError(f"robot {self.name!r}: expected a line sample_time = ..., got none")
         core = _core.Robot.from_toml(text).with_parameters(self.core.parameters())
         core = core.with_operating_point(self.operating_point.tolist())
         if core.velocity_feedforward != self.velocity_feedforward:
@@ -572,36 +570,3 @@ class Robot:
     def axis_numbers(self) -> list[int]:
         """Return the axis numbers, from 1."""
         return list(range(1, self.n_axes + 1))
-
-
-def load_robot(source: Path | str, *, sample_time_s: float | None = None) -> Robot:
-    """Return the robot of a ``source``: a TOML file, a model file (URDF, MJCF, DH table) or a preset.
-
-    Presets: ``irb6600_like`` (20 states) and ``two_mass_axis`` (thesis Table 9.1,
-    model m3, with its cubic spring and Coulomb friction). `axisight.robot_import.import_robot` reads model
-    files. ``sample_time_s`` [s] is for a model file whose drive data state no sample time; robot files
-    state their own. Raises RobotError naming file, line, key and expectation.
-    """
-    if isinstance(source, str) and source in PRESETS:
-        text = (resources.files("axisight.robot.presets") / f"{source}.toml").read_text("utf-8")
-        return Robot.from_toml(text)
-    path = usable_path(source, RobotError)
-    # Imported here, as `robot_import` itself imports this package, and its readers load slowly.
-    if is_model_file(path):
-        found: Robot = import_module("axisight.robot_import").import_robot(
-            path, sample_time_s=sample_time_s
-        )
-        return found
-    try:
-        text = read_text(path)
-    except (OSError, UnicodeDecodeError) as error:
-        known = ", ".join(PRESETS)
-        meant = did_you_mean(source, PRESETS)
-        raise RobotError(
-            f"{path}: expected a robot description or a preset ({known}): {error}{meant}"
-        ) from error
-    refuse_neither(text, str(path))
-    try:
-        return Robot.from_toml(text)
-    except RobotError as error:
-        raise RobotError(f"{path}: {error}") from None

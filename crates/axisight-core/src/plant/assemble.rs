@@ -2,7 +2,7 @@
 
 use crate::effects::{self, EffectError, EffectInfo};
 use crate::robot::{EffectSetting, Parameter, RobotDescription};
-use crate::simulation::{Method, Stepper};
+use crate::simulation::{self, Stepper};
 use axisight_plant::plant::{
     self, Linearization, LinearizationError, PlacedKernel, Plant, PlantError,
 };
@@ -52,17 +52,16 @@ pub fn linearize(
     plant::linearize(&plain, &seeded(robot, settings)?, driven)
 }
 
-/// `method` for `robot` with `settings`, with more fixed sub-steps if its own are unstable.
+/// Steps of Runge-Kutta per sample that stay stable near standstill for `robot` with `settings`.
 ///
 /// # Errors
 /// [`PlantError`] as for [`assemble`].
-pub fn stable(
-    method: Method,
+pub fn stable_substeps(
     robot: &RobotDescription,
     settings: &[EffectSetting<f64>],
-) -> Result<Method, PlantError> {
+) -> Result<usize, PlantError> {
     let decay = plant::fastest_decay(&seeded(robot, settings)?);
-    Ok(method.stable_at(decay, robot.sample_time))
+    Ok(simulation::stable_substeps(decay, robot.sample_time))
 }
 
 /// Integrator of `plant`, which must be that of `robot` with `settings`, for any method.

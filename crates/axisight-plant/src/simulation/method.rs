@@ -61,20 +61,10 @@ impl Method {
     }
 
     /// The same method with more fixed sub-steps if its own are unstable at `decay` [1/s]
-    /// ([`crate::plant::fastest_decay`]); methods with error control shorten their steps themselves.
-    ///
-    /// An unstable speed near standstill stays bounded, since friction has a largest value. Its
-    /// derivatives grow without bound.
+    /// ([`stable_substeps`]); methods with error control shorten their steps themselves.
     #[must_use]
     pub fn stable_at(self, decay: f64, sample_time: f64) -> Self {
-        // The boundary on the real axis is 2.8 for Runge-Kutta of order 4.
-        const LONGEST: f64 = 2.0;
-        const MOST: usize = 16;
-        // Limited to a small number.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let needed = (decay * sample_time / LONGEST)
-            .ceil()
-            .clamp(1.0, MOST as f64) as usize;
+        let needed = stable_substeps(decay, sample_time);
         match self {
             Self::RungeKutta4 { substeps } => Self::RungeKutta4 {
                 substeps: substeps.max(needed),
@@ -93,6 +83,21 @@ impl Method {
             Self::RadauIia { .. } | Self::Rosenbrock { .. } | Self::Automatic { .. }
         )
     }
+}
+
+/// Fixed sub-steps of a sample that are stable where a motor's speed decays at `decay` [1/s]
+/// ([`crate::plant::fastest_decay`]), from 1 to 16.
+///
+/// An unstable speed near standstill stays bounded, since friction has a largest value. Its
+/// derivatives grow without bound.
+pub fn stable_substeps(decay: f64, sample_time: f64) -> usize {
+    // The boundary on the real axis is 2.8 for Runge-Kutta of order 4.
+    const LONGEST: f64 = 2.0;
+    const MOST: f64 = 16.0;
+    // A small positive number.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let needed = (decay * sample_time / LONGEST).ceil().clamp(1.0, MOST) as usize;
+    needed.max(1)
 }
 
 /// Effort of a run.

@@ -17,5 +17,5 @@ pub use closed_loop::{
     Drive, Run, Sample, Signals, SimulationError, Status, check, lane_value, simulate,
 };
 pub use controller::{ControlLoop, OwnLaw};
-pub use method::{CourseOfAnother, Effort, Method, Stepper};
+pub use method::{CourseOfAnother, Effort, Method, Stepper, stable_substeps};
 pub use torque_path::{Line, SampleTorque, TorqueBuffers, TorquePath};

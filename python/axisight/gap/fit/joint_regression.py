@@ -26,7 +26,7 @@ class JointRegression:
 
     - ``at``: where the step begins; ``layout``: axis and stretch of each block.
     - ``loose`` (p,): parameters of which nothing is known but their bounds: a uniform prior. Each needs two bounds.
-    - ``step`` (p,): the step; ``deviation`` (p,): its standard deviation, 0 for a parameter that stays at a bound.
+    - ``step`` (p,): the step; ``deviation`` (p,): the standard deviation of a step without bounds.
     """
 
     def __init__(self, at: NormalEquations, layout: Layout, loose: Mask) -> None:
