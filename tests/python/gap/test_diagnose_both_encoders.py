@@ -10,41 +10,8 @@ import pytest
 
 from axisight import Effect, Log, Robot, diagnose, load_robot, simulate
 from axisight.gap import Diagnosis
+from servo_lever import ELASTIC
 
-ARM = """
-schema = "axisight.robot/2"
-name = "lever"
-gravity = [0.0, 0.0, -9.81]
-sample_time = 0.002
-
-[[joint]]
-name = "lever"
-kind = "driven"
-motion = "revolute"
-origin = [0.0, 0.0, 0.0]
-axis = [0.0, 1.0, 0.0]
-stiffness = 250.0
-damping = 1.0
-
-[joint.link]
-mass = 1.5
-com = [0.0, 0.0, -0.2]
-inertia = [0.01, 0.01, 0.001, 0.0, 0.0, 0.0]
-
-[joint.drive]
-gear_ratio = 1.0
-motor_inertia = 0.06
-viscous_friction = 0.8
-
-[controller]
-kind = "pd_position"
-kp = [150.0]
-kd = [6.0]
-velocity_feedforward = false
-
-[sensor]
-position_noise_std = 2e-5
-"""
 NOISE_RAD = 2e-5
 SECONDS = 10.0
 START_RAD = 0.03
@@ -55,7 +22,7 @@ SOFTER = Effect("joint_stiffness", 1, {"relative_change": -0.4})
 @pytest.fixture(scope="module")
 def lever(tmp_path_factory: pytest.TempPathFactory) -> Robot:
     path: Path = tmp_path_factory.mktemp("lever") / "lever.toml"
-    path.write_text(ARM, "utf-8")
+    path.write_text(ELASTIC, "utf-8")
     return load_robot(path)
 
 

@@ -28,6 +28,7 @@ from axisight.gap.prepare.reconstructed_references import reference_of
 from axisight.gap.simulator.start_poses import SAYS, at_their_poses, start_of, starts_of
 from gap_data import log_of
 from servo_arm import HOME_RAD, MACHINES, NOMINAL, simulator
+from servo_lever import ELASTIC, RIGID
 
 Array = NDArray[np.float64]
 
@@ -119,42 +120,7 @@ def test_a_robot_without_a_stated_pose_starts_where_its_logs_do(robot: Robot) ->
     assert starts_of(stated, at_their_poses(stated, logs)) is None
 
 
-LEVER = """
-schema = "axisight.robot/2"
-name = "lever"
-gravity = [0.0, 0.0, -9.81]
-sample_time = 0.002
-
-[[joint]]
-name = "lever"
-kind = "driven"
-motion = "revolute"
-origin = [0.0, 0.0, 0.0]
-axis = [0.0, 1.0, 0.0]
-
-[joint.link]
-mass = 1.5
-com = [0.0, 0.0, -0.2]
-inertia = [0.01, 0.01, 0.001, 0.0, 0.0, 0.0]
-
-[joint.drive]
-gear_ratio = 1.0
-motor_inertia = 0.06
-viscous_friction = 0.8
-
-[controller]
-kind = "pd_position"
-kp = [150.0]
-kd = [6.0]
-velocity_feedforward = false
-
-[sensor]
-position_noise_std = 2e-5
-"""
-ELASTIC = LEVER.replace("[joint.link]", "stiffness = 250.0\ndamping = 1.0\n\n[joint.link]")
-
-
-@pytest.mark.parametrize(("text", "start"), [(ELASTIC, [-0.05]), (LEVER, None)])
+@pytest.mark.parametrize(("text", "start"), [(ELASTIC, [-0.05]), (RIGID, None)])
 def test_a_rigid_gear_starts_where_its_motor_does(tmp_path, text, start) -> None:
     """Whatever its joint encoder shows; behind an elastic gear the joint starts where it stood."""
     path = tmp_path / "lever.toml"
