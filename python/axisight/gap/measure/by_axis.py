@@ -13,6 +13,7 @@ import numpy as np
 
 from axisight.fitting.divergence import must_hold
 from axisight.gap.facts.settings import Settings
+from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.settling import settled
 from axisight.gap.measure.gap_figures import Stage
@@ -36,21 +37,25 @@ def believed_by_axis(found: SearchState, fitter: ModelFitter, settings: Settings
     well = [s.axis for _, s in found.accepted if share[s.axis] >= settings.explained_share]
     if not well:
         return found
-    return replace(_of_axes(found, fitter, set(well)), by_axis=not arm)
+    kept = [f for f, axis in _led(found) if axis in well or f.sure]
+    return replace(_with_only(found, fitter, kept), by_axis=not arm)
 
 
 def without_axis(found: SearchState, fitter: ModelFitter, axis: int) -> SearchState:
-    """Return the search without the causes that led ``axis`` (from 0).
+    """Return the search without the causes that led ``axis`` (from 0), sure ones included.
 
     The other causes explain their axes, whatever the share of the whole arm that they explain.
     """
-    left = {s.axis for _, s in found.accepted} - {axis}
-    return replace(_of_axes(found, fitter, left), by_axis=True)
+    kept = [f for f, led in _led(found) if led != axis]
+    return replace(_with_only(found, fitter, kept), by_axis=True)
 
 
-def _of_axes(found: SearchState, fitter: ModelFitter, axes: set[int]) -> SearchState:
-    causes = zip(found.model.free, found.accepted, strict=True)
-    kept = [f for f, (_, s) in causes if s.axis in axes or f.sure]
+def _led(found: SearchState) -> list[tuple[Hypothesis, int]]:
+    """Return every cause with the axis (from 0) that it led."""
+    return [(f, s.axis) for f, (_, s) in zip(found.model.free, found.accepted, strict=True)]
+
+
+def _with_only(found: SearchState, fitter: ModelFitter, kept: list[Hypothesis]) -> SearchState:
     if len(kept) == len(found.model.free):
         return found
     out = replace(found, steps=[*found.steps])

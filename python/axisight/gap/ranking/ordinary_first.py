@@ -12,6 +12,7 @@ from collections.abc import Callable
 from axisight.effects import Effect, effect_info, effect_table, on_every_machine
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
+from axisight.gap.simulator.own_parameters import has_unknown_constants
 from axisight.robot import Robot
 
 
@@ -66,10 +67,11 @@ def unsaid(fitter: ModelFitter) -> frozenset[str]:
     """Return the names of effects of every machine of which the simulator says nothing, or the same of every axis.
 
     A model file leaves them out, or fills in a number. One that tells a law of friction by axis tells friction: another
-    law of it would stand for what is missing of the first. Empty for a single axis, and in closed loop.
+    law of it would stand for what is missing of the first. Empty for a single axis, in closed loop, and where torque
+    constants are unknown: the bodies tell the scale of torques there, and cannot be left free.
     """
     axes = fitter.robot.axis_numbers()
-    if not fitter.adds_up or len(axes) < 2:
+    if not fitter.adds_up or len(axes) < 2 or has_unknown_constants(fitter.robot, fitter.own):
         return frozenset()
     stated = {
         name: {stated_amplitude(Effect(name, axis), fitter.robot) for axis in axes}

@@ -97,6 +97,12 @@ def unknown_constants(robot: Robot, axes: Sequence[int]) -> list[Parameter]:
     return [_uncertain(robot, constant_name(robot, axis), UNKNOWN) for axis in axes]
 
 
+def has_unknown_constants(robot: Robot, own: Sequence[Parameter]) -> bool:
+    """Whether torque constants are among the parameters ``own`` of a fit: then bodies tell the scale of torques."""
+    constants = {constant_name(robot, axis) for axis in robot.axis_numbers()}
+    return any(parameter.name in constants for parameter in own)
+
+
 def uncertain_gains(robot: Robot, tolerances: Mapping[str, float]) -> list[Parameter]:
     """Return the gains that have a tolerance as parameters of a fit.
 

@@ -48,7 +48,7 @@ def validated(
     """
     errors = refitted_errors(view, found)
     clear = stands_out(errors)
-    lost: list[str] = []
+    lost: dict[int, str] = {}
     while True:
         concluded = conclude(found, settings=settings, stands_out=clear, shown=view.shown)
         conclusion = open_with_constants(concluded, unknown_constants)
@@ -57,9 +57,9 @@ def validated(
         reach = reach_of(view, held_logs, found, conclusion.effects, settings)
         own = _axes_alone(view, conclusion, reach)
         axis = None if own is None else own.not_carried()
-        if own is None or axis is None or len(own.axes) < 2:
-            return Validated(found, errors, conclusion.with_checks(lost), reach, own)
-        lost.append(
+        if own is None or axis is None or axis in lost or len(own.axes) < 2:
+            return Validated(found, errors, conclusion.with_checks([*lost.values()]), reach, own)
+        lost[axis] = (
             f"The causes found on axis {axis + 1} are left out: what explains the estimation logs there does not "
             "carry over to the validation logs."
         )
