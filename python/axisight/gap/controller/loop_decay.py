@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -16,8 +18,6 @@ FORGOTTEN = 0.01
 
 Equal to the formula error of a torque (`Settings.model_error`, 1 %).
 """
-# Smallest size of an eigenvalue, to keep its logarithm finite. Such a mode ends within one sample.
-_AT_ONCE = 1e-12
 
 
 def slowest_decay_1_s(robot: Robot, joint_angle_rad: Array) -> float:
@@ -31,8 +31,9 @@ def slowest_decay_1_s(robot: Robot, joint_angle_rad: Array) -> float:
     gains = robot.controller_gains
     if "kd" in gains:
         return float(-scipy.linalg.eigvals(_continuous(robot, *plant)).real.max())
-    sizes = np.abs(scipy.linalg.eigvals(_sampled(robot, *plant)))
-    return float(-np.log(max(float(sizes.max()), _AT_ONCE)) / robot.sample_time_s)
+    largest = float(np.abs(scipy.linalg.eigvals(_sampled(robot, *plant))).max())
+    # Modes of zero end within one sample.
+    return -math.log(largest) / robot.sample_time_s if largest > 0 else math.inf
 
 
 def _continuous(robot: Robot, states: Array, inputs: Array, outputs: Array) -> Array:

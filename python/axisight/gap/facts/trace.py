@@ -21,6 +21,7 @@ RULES: Mapping[str, str] = MappingProxyType(
         "likelihood": "How well the hypothesis predicts data that were left out of its fit.",
         "cost": "A price for each number that was fitted (Schwarz 1978).",
         "own_parameters": "A price for moving the simulator's own parameters away from their stated values.",
+        "size": "A price for an effect whose torque is many times the largest torque of the motor.",
         "formula_error": "Effects of this kind have one accepted formula, so small differences count.",
         "better_fit": "It fits as well as the leader or better and predicts nearly as well: both are equally likely.",
         "plainer_law": "The logs do not show what this law adds to a plainer one, so it is less likely than that.",

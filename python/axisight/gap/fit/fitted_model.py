@@ -22,6 +22,7 @@ class Hypothesis:
     - ``starts``: further start values, since a fit may end in a local minimum.
     - ``stated``: values of the effect that the simulator already has.
     - ``deflections_rad``: range in which the torques of the logs turn a linear gear, for gear laws.
+    - ``largest``: size by amplitude from which it is far-fetched on this robot.
     - ``sure``: interval by parameter that holds for any bodies of the arm. It leaves out what the simulator has, and
       the fit stays in it.
     """
@@ -33,6 +34,7 @@ class Hypothesis:
     starts: tuple[Mapping[str, float], ...] = ()
     stated: Mapping[str, float] = field(default_factory=dict)
     deflections_rad: tuple[float, float] | None = None
+    largest: Mapping[str, float] = field(default_factory=dict)
     sure: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def at(self, values: Mapping[str, float]) -> Hypothesis:

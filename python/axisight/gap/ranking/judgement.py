@@ -25,6 +25,7 @@ from axisight.gap.ranking.likelihood import (
 from axisight.gap.ranking.plainer_law import held_to_plainer
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis, in_order
 from axisight.gap.ranking.price_of_bending import price_of_bending
+from axisight.gap.ranking.price_of_size import price_of_size
 
 Array = NDArray[np.float64]
 
@@ -64,6 +65,9 @@ def stand(
     belief.becomes("cost", likelihood - cost)
     prices = _prices(mine, without, current, floor, layout)
     belief.becomes("own_parameters", belief.log_weight - prices)
+    sizes = np.array([*(price_of_size(t.fitted) for t in mine), price_of_size(without), 0.0])
+    belief.becomes("size", belief.log_weight - sizes)
+    prices += sizes
     fitted = np.array([_fitted_loss(t.fitted, here) for t in mine])
     apart = held_apart(
         [t.hypothesis for t in mine],
@@ -143,14 +147,16 @@ def set_likelier(
 ) -> bool:
     """Whether one effect is likelier than several on ``axis`` (from 0; None: on all together).
 
-    Compares likelihood, cost of numbers, and price of own parameters. No formula error is added, since a further effect
-    removes more than that. Each effect costs one number more. Losses below ``floor`` (n_blocks,) count as the floor.
+    Compares likelihood, cost of numbers, and prices of own parameters and sizes. No formula error is added, since a
+    further effect removes more than that. Each effect costs one number more. Losses below ``floor`` (n_blocks,) count
+    as the floor.
     """
     here = layout.of(axis)
     both = [one, several]
     left = np.array([max(t.held_out[here].sum(), floor[here].sum()) for t in both])
     cost = PARAMETER_COST * np.array([t.cost + 1 + len(t.also) for t in both])
     price = _prices(both, without, held_out_loss(without), floor, layout)[:2]
+    price += [price_of_size(t.fitted) for t in both]
     weight = -0.5 * INDEPENDENT_BLOCKS * np.log(left) - cost - price
     return bool(weight[0] > weight[1])
 

@@ -28,7 +28,7 @@ class AxisSizes:
     """Reference sizes of an axis: torque [Nm] and speed [rad/s] of its motor in the logs, and values of its robot.
 
     ``ratio``: joint angle per motor angle; ``stiffness`` [Nm/rad, joint side], None for a rigid gear;
-    ``motor_inertia`` [kg m^2]; ``last_kg``: mass of the last link [kg].
+    ``motor_inertia`` [kg m^2]; ``last_kg``: mass of the last link [kg]; ``travel_rad``: range of the joint angle.
     """
 
     torque_nm: float
@@ -37,6 +37,14 @@ class AxisSizes:
     stiffness: float | None
     motor_inertia: float
     last_kg: float
+    travel_rad: float
+
+    def of_torque(self, unit: str) -> float | None:
+        """Return the amplitude with which an effect alone gives ``torque_nm``, by its unit; None if it is no torque."""
+        if unit == "Nm/rad (joint side)":
+            return self.torque_nm / self.ratio / self.travel_rad if self.travel_rad > 0 else None
+        torques = ("Nm", "Nm s/rad", "Nm s^2/rad^2", "Nm (joint side)")
+        return _BY_UNIT[unit](self) if unit in torques else None
 
     @property
     def deflection_rad(self) -> float:
@@ -57,6 +65,10 @@ _BY_UNIT: Mapping[str, Callable[[AxisSizes], float]] = {
     "kg": lambda a: a.last_kg,
     "1/W": lambda a: 1 / max(a.torque_nm * a.speed_rad_s, 1e-300),
 }
+
+
+# Largest torque of an effect that is not far-fetched, as a multiple of the largest torque of the motor.
+_FAR_FETCHED = 3.0
 
 
 class NaturalSizes:
@@ -84,16 +96,32 @@ class NaturalSizes:
         most = _SHARE * min(of(a) for a in axes)
         return min(parameter.typical, most) if most > 0 else parameter.typical
 
+    def largest(self, effect: Effect) -> dict[str, float]:
+        """Return the size, by amplitude that is a torque, at which an effect begins to be far-fetched.
+
+        It alone gives three times the largest torque of the motor then, and another effect has to take that away again.
+        An effect on several axes has the size of the strongest.
+        """
+        axes = [a for i, a in enumerate(self.axes, 1) if effect.acts_on(i)]
+        sizes = {
+            p.name: _FAR_FETCHED * max((a.of_torque(p.unit) or 0.0 for a in axes), default=0.0)
+            for p in effect_info(effect.name).parameters
+            if p.role == "amplitude"
+        }
+        return {name: size for name, size in sizes.items() if size > 0}
+
     def _axis(self, place: int) -> AxisSizes:
         joint = self.robot.joints[self.robot.axis_joints[place]]
+        ratio = abs(float(self.robot.gear_ratio[place]))
         masses = [j.link.mass_kg for j in self.robot.joints if j.link is not None]
         return AxisSizes(
             torque_nm=max(float(np.abs(log.torque_nm[:, place]).max()) for log in self.logs),
             speed_rad_s=max(_top_speed(log, place) for log in self.logs),
-            ratio=abs(float(self.robot.gear_ratio[place])),
+            ratio=ratio,
             stiffness=None if joint.spring is None else joint.spring.stiffness,
             motor_inertia=np.inf if joint.drive is None else joint.drive.motor_inertia,
             last_kg=masses[-1] if masses else np.inf,
+            travel_rad=ratio * max(float(np.ptp(log.position_rad[:, place])) for log in self.logs),
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -68,7 +68,8 @@ class View(ABC):
 
     def __post_init__(self) -> None:
         """Give the fitter the natural sizes of effects, the readings of gears and the unknown torque constants."""
-        self.fitter.natural = NaturalSizes(self.robot, self.logs)
+        self._sizes = NaturalSizes(self.robot, self.logs)
+        self.fitter.natural = self._sizes
         if self.mode == "closed_loop":
             self.fitter.gears = gear_readings(self.robot, self.logs, self.settings.model_error)
         self.fitter.own += unknown_constants(self.robot, unknown_axes(self.logs))
@@ -110,7 +111,11 @@ class View(ABC):
             threads=self.settings.threads,
         )
         none = self.not_offered | absorbed(self.robot, self.fitter.own)
-        return [f for f in found if f.effect.label not in none]
+        return [
+            replace(f, largest=self._sizes.largest(f.effect))
+            for f in found
+            if f.effect.label not in none
+        ]
 
     def _weighted_response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
         weighting = self.fitter.weighting

@@ -487,6 +487,26 @@ def test_bending_counts_between_weights_that_are_held_apart_too():
     assert odds[1] == pytest.approx(np.exp(-0.5 * 4.0**2))
 
 
+def sized(coulomb_nm: float, stated_nm: float, axis: int = 1) -> FittedHypothesis:
+    """Coulomb friction of this size, where three times the torque of the motor is 2 Nm."""
+    effect = Effect("coulomb_friction", axis, {"coulomb_nm": coulomb_nm})
+    one = Hypothesis(
+        effect, ("coulomb_nm",), stated={"coulomb_nm": stated_nm}, largest={"coulomb_nm": 2.0}
+    )
+    fitted = replace(NO_EFFECT, effects=(effect,), free=(one,))
+    return FittedHypothesis(one, fitted, np.full(40, 1.1))
+
+
+def test_of_equal_fits_the_one_of_an_ordinary_size_is_likelier():
+    usual, giant = sized(0.2, 0.0), sized(9.0, 1.0, axis=2)
+    found = standing([giant, usual])
+    assert found.best.trial is usual
+    # Half of the squared size over its prior, about what the simulator states: (8 / 2)^2 / 2 and (0.2 / 2)^2 / 2.
+    said = {e.hypothesis: e.nats for e in found.ledger if e.rule == "size"}
+    assert said == pytest.approx({giant.label: -8.0, usual.label: -0.005})
+    assert found.ranked[1].probability / found.best.probability == pytest.approx(np.exp(-7.995))
+
+
 def test_of_what_is_as_likely_that_of_the_axis_comes_first_and_stays_so():
     here = a_trial("viscous_friction", 1, np.full(40, 1.1), axis=1)
     elsewhere = a_trial("viscous_friction", 1, np.full(40, 1.1 - 1e-9), axis=2)

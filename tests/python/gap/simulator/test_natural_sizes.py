@@ -64,6 +64,23 @@ def test_a_small_robot_has_sizes_of_its_own(small: Robot):
         assert at_rest.of(Effect(name, 2), size) == typical
 
 
+def test_what_is_far_fetched_is_three_times_the_torque_of_the_motor(small: Robot):
+    logs = logs_of(small, [], 2.0)
+    sizes = NaturalSizes(small, logs)
+    ratio = float(small.gear_ratio[1])
+    torque = max(np.abs(log.torque_nm[:, 1]).max() for log in logs)
+    turn = ratio * max(np.ptp(log.position_rad[:, 1]) for log in logs)
+    assert sizes.largest(Effect("coulomb_friction", 2)) == {"coulomb_nm": pytest.approx(3 * torque)}
+    spring = sizes.largest(Effect("cable_stiffness", 2))
+    # Over the range in which the joint turned, the spring alone gives that torque on the joint side.
+    assert spring["stiffness_nm_rad"] * turn == pytest.approx(3 * torque / ratio)
+    assert spring["at_zero_nm"] == pytest.approx(3 * torque / ratio)
+    # What is no torque has no such size, and an axis without torque gives none.
+    assert sizes.largest(Effect("payload", None)) == sizes.largest(Effect("backlash", 2)) == {}
+    still = [replace(x, torque_nm=np.zeros_like(x.torque_nm)) for x in logs]
+    assert NaturalSizes(small, still).largest(Effect("coulomb_friction", 2)) == {}
+
+
 @pytest.mark.parametrize(
     ("truth", "moving"),
     [
