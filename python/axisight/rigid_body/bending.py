@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.signal
 from numpy.typing import NDArray
 
 from axisight.logs import Log
@@ -103,7 +102,7 @@ def _motion_hz(model: TorqueModel, logs: Sequence[Log], cutoff_hz: float) -> Arr
     for log in logs:
         step = log.sample_time_s
         second = np.diff(model.coupling.joint_motion(log.position_rad), 2, axis=0) / step**2
-        second = second * scipy.signal.windows.hann(len(second), sym=False)[:, None]
+        second = second * np.hanning(len(second) + 1)[:-1, None]
         density = np.abs(np.fft.rfft(second, axis=0)) ** 2
         f = np.fft.rfftfreq(len(second), step)
         gain = (2.0 / step * np.sin(np.pi * f * step)) ** 4

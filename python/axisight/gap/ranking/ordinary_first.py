@@ -13,7 +13,7 @@ from axisight.effects import Effect, effect_info, effect_table, on_every_machine
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.simulator.own_parameters import has_unknown_constants
-from axisight.robot import Robot
+from axisight.gap.simulator.stated_amplitude import stated_amplitude
 
 
 def ordinary_first(
@@ -84,19 +84,3 @@ def unsaid(fitter: ModelFitter) -> frozenset[str]:
 
 def _none_stated(effect: Effect, fitter: ModelFitter) -> bool:
     return stated_amplitude(effect, fitter.robot) == 0
-
-
-def stated_amplitude(effect: Effect, robot: Robot) -> float:
-    """Return the amplitude that a simulator states for an effect, as its own parameter or as an effect; else zero."""
-    own = own_parameter(robot, effect)
-    acting = (e for e in robot.effects if e.label == effect.label and e.acts)
-    beside = next((e.values()[0] for e in acting), 0.0)
-    return beside + (0.0 if own is None else robot.parameters()[own])
-
-
-def own_parameter(robot: Robot, effect: Effect) -> str | None:
-    """Return the name of the simulator's own parameter that an effect changes; None if there is none."""
-    stands_for = effect_info(effect.name).stands_for
-    if stands_for is None or effect.axis is None:
-        return None
-    return robot.axis_parameter(effect.axis, stands_for[0])

@@ -19,9 +19,10 @@ from axisight.gap.fit.joint_regression import JointRegression
 from axisight.gap.fit.settling import settled
 from axisight.gap.ranking.fitted_hypothesis import trial
 from axisight.gap.ranking.judgement import stand
-from axisight.gap.ranking.ordinary_first import own_parameter, stated_amplitude, unsaid
+from axisight.gap.ranking.ordinary_first import unsaid
 from axisight.gap.ranking.posterior import AxisPosterior, RankedHypothesis
 from axisight.gap.screening.free_bodies import FreeBodies, by_amplitude
+from axisight.gap.simulator.stated_amplitude import own_parameter, stated_amplitude
 from axisight.gap.simulator.told_from_bodies import told_from_bodies
 
 Array = NDArray[np.float64]

@@ -148,21 +148,31 @@ class Screening:
         beside = kept_beside(self.model.free, option)
         return not option.effect.acts and len(beside) == len(self.model.free)
 
+    def felt(self, option: Hypothesis) -> Hypothesis:
+        """Return a candidate with those parameters free that change the model at its start values.
+
+        The shape of an effect that is not there changes nothing.
+        """
+        sizes = _amplitudes_free(option)
+        return replace(option, free=sizes) if sizes and self.idle(option) else option
+
     def groups(self, options: Sequence[Hypothesis]) -> list[list[Hypothesis]]:
         """Return the candidates grouped by evaluation: those without effect at their start values share one."""
         alone: list[Hypothesis] = []
         together: list[Hypothesis] = []
         for option in options:
-            few = len(option.free) <= _TOGETHER
+            few = len(self.felt(option).free) <= _TOGETHER
             (together if self.idle(option) and few else alone).append(option)
         groups: list[list[Hypothesis]] = []
-        for option in sorted(together, key=lambda o: -len(o.free)):
-            room = (g for g in groups if _size(g) + len(option.free) <= _TOGETHER)
-            group = next(room, None)
-            if group is None:
-                groups.append([option])
-            else:
-                group.append(option)
+        left: list[int] = []
+        for option in sorted(together, key=lambda o: -len(self.felt(o).free)):
+            size = len(self.felt(option).free)
+            at = next((i for i, room in enumerate(left) if size <= room), len(groups))
+            if at == len(groups):
+                groups.append([])
+                left.append(_TOGETHER)
+            groups[at].append(option)
+            left[at] -= size
         return [[option] for option in alone] + groups
 
     def starts(self, group: list[Hypothesis]) -> list[Start]:
@@ -190,8 +200,9 @@ class Screening:
 
     def _shared(self, group: Sequence[Hypothesis]) -> list[NormalEquations | None]:
         """Return the normal equations of the model with each candidate of a group; None for those that diverge."""
-        found = self._run(group)
-        for option, fitted in zip(group, found, strict=True):
+        felt = [self.felt(option) for option in group]
+        found = self._run(felt)
+        for option, fitted in zip(felt, found, strict=True):
             lasting = self.idle(option) and self.fitter.lasting(option)
             if fitted is not None and lasting:
                 self.kept.keep(option, fitted)
@@ -224,11 +235,8 @@ class Screening:
         return best
 
     def _at_starts(self, option: Hypothesis) -> list[Hypothesis]:
-        """Return a candidate at its further start values, with only its amplitudes free.
-
-        The shape of an effect with zero amplitude changes nothing.
-        """
-        sizes = replace(option, free=tuple(n for n in option.free if n in _amplitudes(option)))
+        """Return a candidate at its further start values, with only its amplitudes free."""
+        sizes = replace(option, free=_amplitudes_free(option))
         return [sizes.at(option.at(v).effect.parameters or {}) for v in option.starts]
 
     def _start(self, option: Hypothesis, fitted: NormalEquations | None) -> Start:
@@ -302,13 +310,14 @@ class CachedScreening(Screening):
         """Whether the cache has everything that the screening of a candidate needs."""
         scanned = bool(option.starts) and len(option.free) == 1
         wanted = [option, *self._at_starts(option)]
-        known = all(self.kept.rows(o) is not None for o in wanted)
+        known = all(self.kept.rows(self.felt(o)) is not None for o in wanted)
         return known and self.idle(option) and not scanned
 
     def _shared(self, group: Sequence[Hypothesis]) -> list[NormalEquations | None]:
         return [self._with(option) for option in group]
 
-    def _with(self, option: Hypothesis) -> NormalEquations | None:
+    def _with(self, candidate: Hypothesis) -> NormalEquations | None:
+        option = self.felt(candidate)
         rows = self.kept.rows(option)
         if rows is None:
             return None
@@ -379,10 +388,8 @@ def loudest_logs(above: Array, layout: Layout, before: Sequence[int] = ()) -> li
     return sorted(int(log) for log in logs[most])
 
 
-def _amplitudes(option: Hypothesis) -> set[str]:
+def _amplitudes_free(option: Hypothesis) -> tuple[str, ...]:
+    """Return the free parameters of a candidate that are amplitudes."""
     info = effect_info(option.effect.name)
-    return {p.name for p in info.parameters if p.role == "amplitude"}
-
-
-def _size(group: Sequence[Hypothesis]) -> int:
-    return sum(len(option.free) for option in group)
+    sizes = {p.name for p in info.parameters if p.role == "amplitude"}
+    return tuple(name for name in option.free if name in sizes)

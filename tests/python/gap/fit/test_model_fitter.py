@@ -266,17 +266,24 @@ def test_candidates_share_evaluations_of_no_more_parameters_than_the_core_takes(
         candidate("input_delay", 1),
         candidate("load_dependent_friction", 2, axis=2),
     ]
-    groups = screen(fitted()).groups(options)
+    screening = screen(fitted())
+    groups = screening.groups(options)
     assert sorted(o.effect.label for g in groups for o in g) == sorted(
         o.effect.label for o in options
     )
     by_name = {o.effect.name: [p.effect.name for p in g] for g in groups for o in g}
-    for name in ("torque_saturation", "torque_constant", "torque_ripple"):
+    for name in ("torque_saturation", "torque_constant"):
         assert by_name[name] == [name]
-    shared = [g for g in groups if len(g) > 1]
-    assert all(sum(len(o.free) for o in g) <= 4 for g in shared)
-    # 4 + (3 + 1) + (2 + 2) + (1 + 1): none could be saved.
-    assert len(groups) == 3 + 4
+    # The shape of what is not there changes nothing, and is not evaluated.
+    felt = {o.effect.name: len(screening.felt(o).free) for o in options}
+    assert (felt["asymmetric_friction"], felt["torque_ripple"], felt["stribeck_friction"]) == (
+        2,
+        4,
+        2,
+    )
+    assert all(sum(felt[o.effect.name] for o in g) <= 4 for g in groups)
+    # 4 + (2 + 2) + (2 + 1 + 1) + (1 + 1): none could be saved.
+    assert len(groups) == 2 + 4
 
 
 def test_what_takes_the_place_of_an_effect_is_evaluated_alone():

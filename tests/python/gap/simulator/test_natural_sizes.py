@@ -75,6 +75,11 @@ def test_what_is_far_fetched_is_three_times_the_torque_of_the_motor(small: Robot
     # Over the range in which the joint turned, the spring alone gives that torque on the joint side.
     assert spring["stiffness_nm_rad"] * turn == pytest.approx(3 * torque / ratio)
     assert spring["at_zero_nm"] == pytest.approx(3 * torque / ratio)
+    # A simulator may state more, and a machine have none of that.
+    placeholder = small.with_effects([Effect("coulomb_friction", 2, {"coulomb_nm": 50.0 * torque})])
+    assert NaturalSizes(placeholder, logs).largest(Effect("coulomb_friction", 2)) == {
+        "coulomb_nm": pytest.approx(50.0 * torque)
+    }
     # What is no torque has no such size, and an axis without torque gives none.
     assert sizes.largest(Effect("payload", None)) == sizes.largest(Effect("backlash", 2)) == {}
     still = [replace(x, torque_nm=np.zeros_like(x.torque_nm)) for x in logs]

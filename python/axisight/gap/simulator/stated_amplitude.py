@@ -1,0 +1,22 @@
+"""What a simulator states of an effect: its own parameter that the effect changes, or the effect itself."""
+
+from __future__ import annotations
+
+from axisight.effects import Effect, effect_info
+from axisight.robot import Robot
+
+
+def stated_amplitude(effect: Effect, robot: Robot) -> float:
+    """Return the amplitude that a simulator states for an effect, as its own parameter or as an effect; else zero."""
+    own = own_parameter(robot, effect)
+    acting = (e for e in robot.effects if e.label == effect.label and e.acts)
+    beside = next((e.values()[0] for e in acting), 0.0)
+    return beside + (0.0 if own is None else robot.parameters()[own])
+
+
+def own_parameter(robot: Robot, effect: Effect) -> str | None:
+    """Return the name of the simulator's own parameter that an effect changes; None if there is none."""
+    stands_for = effect_info(effect.name).stands_for
+    if stands_for is None or effect.axis is None:
+        return None
+    return robot.axis_parameter(effect.axis, stands_for[0])
