@@ -1181,6 +1181,7 @@ def optimize_crest_factor(
 # Signal, coefficient of each joint, coefficient in each row, dead band, smoothing.
 _Extra: TypeAlias = tuple[str, Sequence[float], Sequence[float], float, float]
 
+def recursive(above: Sequence[float], below: Sequence[float], signals: _Array) -> _Array: ...
 def torque_regressor(
     robot: Robot,
     q: _Array,

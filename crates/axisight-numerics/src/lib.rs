@@ -1,5 +1,5 @@
 //! Numerics with concrete types: Fourier transforms, eigenvalues, batches of small complex systems,
-//! weighting of residuals over frequency, and least squares.
+//! weighting of residuals over frequency, recursive filters, and least squares.
 //!
 //! Generic libraries are compiled where they are used with a concrete type. Only this crate uses
 //! rustfft and faer, so a change in another crate does not build them again.
@@ -22,6 +22,7 @@ mod lockstep_lu;
 mod pair;
 mod plan;
 mod pseudo_inverse;
+pub mod recursion;
 mod weighting;
 
 pub use complex_batch::{BatchShapeError, Threads, invert_batch, right_divide_batch};

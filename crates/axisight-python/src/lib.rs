@@ -18,6 +18,7 @@ mod local_models;
 mod montecarlo;
 mod own_pool;
 mod plant;
+mod recursion;
 mod regressor;
 mod robot;
 mod simulation;
@@ -69,6 +70,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(frf::multivariable, module)?)?;
     module.add_function(wrap_pyfunction!(local_models::frf_local_model, module)?)?;
     module.add_function(wrap_pyfunction!(local_models::frf_local_periodic, module)?)?;
+    module.add_function(wrap_pyfunction!(recursion::recursive, module)?)?;
     module.add_function(wrap_pyfunction!(regressor::torque_regressor, module)?)?;
     module.add_function(wrap_pyfunction!(regressor::inertial_parameters, module)?)?;
     module.add_function(wrap_pyfunction!(regressor::energy_regressor, module)?)?;

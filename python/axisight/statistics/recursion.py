@@ -1,7 +1,7 @@
 """Recursive filters: linear difference equations, and low-passes of Butterworth's kind.
 
-A difference equation is a triangular system of equations with a narrow band, which LAPACK solves row by row. So no
-filter of ``scipy.signal`` is needed, which takes longer to load than all filters of a diagnosis take to run.
+The core solves the difference equations, since ``scipy.signal`` takes longer to load than all filters of a diagnosis
+take to run.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
+
+from axisight import _core
 
 Array = NDArray[np.float64]
 
@@ -19,15 +20,10 @@ def recursive(above: Sequence[float], below: Sequence[float], x: Array) -> Array
     """Return ``y`` of the shape of ``x``, (n,) or (n, k), filtered along the first dimension.
 
     ``below[0] y[t] + below[1] y[t - 1] + ... = above[0] x[t] + above[1] x[t - 1] + ...``; ``x`` and ``y`` are zero
-    before the first sample. ``below[0]`` must not be zero.
+    before the first sample. Raises InputError if ``below[0]`` is zero.
     """
-    moved = above[0] * x
-    for lag, factor in enumerate(above[1:], 1):
-        moved[lag:] += factor * x[:-lag]
-    band = np.repeat(np.asarray(below, dtype=np.float64)[:, None] / below[0], len(x), axis=1)
-    columns = np.asfortranarray(moved.reshape(len(x), -1) / below[0])
-    y, _ = lapack.dtbtrs(band, columns, uplo="L", diag="U", overwrite_b=True)
-    return np.asarray(y, dtype=np.float64).reshape(x.shape)
+    signals = np.asarray(x, dtype=np.float64)
+    return _core.recursive(above, below, signals.reshape(len(x), -1)).reshape(signals.shape)
 
 
 def settled(above: Sequence[float], below: Sequence[float], x: Array) -> Array:
