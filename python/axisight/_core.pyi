@@ -53,6 +53,7 @@ __all__ = [
     "optimize_crest_factor",
     "random_phases",
     "record_spectra",
+    "recursive",
     "regression_factors",
     "right_divide_matrices",
     "simulate_batch",
