@@ -16,7 +16,8 @@ from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import linear_gain
 from axisight.gap.fit.model_fitter import ModelFitter
-from axisight.gap.fit.settling import RENEWALS, settled
+from axisight.gap.fit.settling import RENEWALS, has_settled, settled
+from axisight.gap.fit.tolerance_edges import BENT, bent
 from axisight.gap.ranking.drive_lags import ended, lags_beside
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, trial
 from axisight.gap.ranking.posterior import AxisPosterior
@@ -50,8 +51,8 @@ class Field(Protocol):
     def standings(self, trials: Sequence[FittedHypothesis]) -> list[AxisPosterior]:
         """Return the posteriors of the axes that the trials improve."""
 
-    def looked_at(self, begun: FittedModel) -> FittedModel | Diverged:
-        """Return a fit to part of the data, evaluated on all of it."""
+    def compared(self, begun: FittedModel) -> FittedModel | Diverged | None:
+        """Return a fit to part of the data, evaluated on all of it; None if that diverges."""
 
 
 # Starts of one hypothesis that get a fit: the best two by one linear step. The second may lie in another minimum.
@@ -154,8 +155,13 @@ class Restarts:
         here = self.round
         part = here.rough or here.fitter
         free = [*leader.free[:-1], option]
-        found = part.fit(free, leader, robot_values=values, refreshes=RENEWALS)
-        if not isinstance(found, Diverged):
+        if bent(here.fitter, leader) < BENT:
+            # Sensitivities of the own parameters are those of the screened model.
+            start = replace(leader, columns=here.screened.columns)
+            found = part.fit(free, start, robot_values=values, lazy=True)
+        else:
+            found = part.fit(free, leader, robot_values=values, refreshes=RENEWALS)
+        if not isinstance(found, Diverged) and not has_settled(found):
             found = settled(part, found.free, found)
         return self._held(found, option.effect.label)
 
@@ -163,10 +169,10 @@ class Restarts:
         """Return a fit to the data of the screen as a trial on all data; None if it diverges there."""
         here = self.round
         all_data = here.rough is None
-        found = begun if all_data else self._held(here.looked_at(begun), option.effect.label)
+        found = begun if all_data else self._held(here.compared(begun), option.effect.label)
         return None if found is None else trial(option, found, here.model)
 
-    def _held(self, found: FittedModel | Diverged, label: str) -> FittedModel | None:
+    def _held(self, found: FittedModel | Diverged | None, label: str) -> FittedModel | None:
         if isinstance(found, Diverged):
             self.round.skipped.setdefault(label, str(found))
             return None

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -233,6 +234,17 @@ class SearchRound:
             return found
         # An unsettled fit does not count as renewed: if it becomes a cause, it is fitted on.
         return replace(found, renewed=found.renewed and has_settled(found))
+
+    def compared(self, begun: FittedModel) -> FittedModel | Diverged | None:
+        """Return a fit to part of the data, evaluated on all of it; None if that diverges.
+
+        If it hardly bends the own parameters, their sensitivities are those of the model.
+        """
+        if bent(self.fitter, begun) >= BENT:
+            return self.looked_at(begun)
+        *others, option = begun.free
+        solve = partial(self.fitter.fit, lazy=True, max_iterations=0)
+        return self.bench.attempt(solve, option, begun.robot_values, beside=others, close=True)
 
     def run_waiting(
         self, trials: list[FittedHypothesis], options: Sequence[Hypothesis], number: int

@@ -54,11 +54,13 @@ def _target(log: Log) -> Array | None:
 
 def _stopped_at(position: Array, target: Array, step_s: float) -> float | None:
     """Return the time [s] up to which a position (n,) surely follows its target (n,); None if it follows to the end."""
-    length = max(2, round(2 * LATE_S / step_s))
     latest = min(round(LATE_S / step_s), len(position) // 2)
     # Steps of a twentieth of the longest delay miss little of a motion that is followed at all.
-    tried = range(0, latest + 1, max(1, latest // 20))
-    each = [_stretches(position[lag:], target[: len(target) - lag], length) for lag in tried]
+    apart = max(1, latest // 20)
+    length = max(2, round(2 * LATE_S / step_s) // apart) * apart
+    x, y = position[::apart], target[::apart]
+    tried = range(latest // apart + 1)
+    each = [_stretches(x[lag:], y[: len(y) - lag], length // apart) for lag in tried]
     # The delay of the loop is that with which most is followed.
     left, less, moving = max(each, key=lambda x: int(np.sum((x[0] < ALIKE) & x[2])))
     follows = np.flatnonzero(moving & (left < ALIKE))
