@@ -12,6 +12,7 @@ from axisight.effects import Effect, effect_info, effect_table
 from axisight.effects.relations import Resembles
 from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
+from axisight.gap.fit.held_out import linear_gain
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.posterior import AxisPosterior
@@ -62,6 +63,8 @@ def ended(
 
 
 def _ended(fitter: ModelFitter, fitted: FittedModel) -> FittedModel:
+    if fitted.renewed and linear_gain(fitted) < _WORTH:
+        return fitted
     found = fitter.fit(fitted.free, fitted, fresh=True, max_iterations=_STEPS, worth=_WORTH)
     return fitted if isinstance(found, Diverged) else found
 
