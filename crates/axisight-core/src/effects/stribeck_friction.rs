@@ -2,7 +2,7 @@
 
 use super::formulas::{smoothed_sign, stribeck_level};
 use super::sides::{ARM_SHARE, Friction, on_sides};
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, ParameterInfo, Plainer, SMOOTHING, STRIBECK_SPEED, Shown};
+use super::{Absorber, Acts, BegunFrom, EffectInfo, Experiment, Family, Formula, Kernel, LawOf, ParameterInfo, Plainer, SMOOTHING, STRIBECK_SPEED, Shown};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -24,6 +24,10 @@ pub(super) static INFO: EffectInfo = EffectInfo {
         adds: &["excess_nm", "stribeck_speed_rad_s"],
         likelier: 10.0,
         shown: Shown::Rise,
+    }),
+    begun_from: Some(BegunFrom {
+        law: "coulomb_friction",
+        takes: &[("coulomb_nm", "coulomb_nm"), ("smoothing_rad_s", "smoothing_rad_s"), ("arm_share", "arm_share")],
     }),
     parameters: &[
         ParameterInfo {

@@ -1,7 +1,7 @@
 """Fits hypotheses again that replace the leader of an axis, starting from the leader's fit.
 
 Some minima are too narrow for start values from data. Three kinds of restarts exist: gear laws on the curve of another
-law, stiction after pre-sliding, and position-dependent friction after uniform friction. If one hypothesis has several
+law, stiction after pre-sliding, and laws of friction after a plainer one. If one hypothesis has several
 starts, one linear step selects those that get a fit.
 """
 
@@ -23,7 +23,7 @@ from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis, trial
 from axisight.gap.ranking.posterior import AxisPosterior
 from axisight.gap.screening.restart_gear_law import begun_on_curves
 from axisight.gap.screening.restart_stiction import begun_sticking
-from axisight.gap.screening.restart_uneven_friction import begun_wider
+from axisight.gap.screening.restart_wider_law import begun_wider
 
 Restart = tuple[FittedModel, Hypothesis, Mapping[str, float]]
 """The model whose last effect is replaced, the hypothesis that replaces it, and start values of the own parameters."""

@@ -6,7 +6,7 @@ import pytest
 
 from axisight import Effect
 from axisight.gap.fit.fitted_model import Hypothesis
-from axisight.gap.screening.restart_uneven_friction import begun_wider
+from axisight.gap.screening.restart_wider_law import begun_wider
 
 EVEN = Effect("coulomb_friction", 2, {"coulomb_nm": 0.5, "smoothing_rad_s": 0.3, "arm_share": 0.9})
 UNEVEN = Hypothesis(
