@@ -24,7 +24,9 @@ def begun_wider(
     trials: Sequence[FittedHypothesis],
     offered: Callable[[FittedModel], Sequence[Hypothesis]],
 ) -> list[tuple[FittedModel, Hypothesis]]:
-    """Return restarts with wider laws for axes that a plainer law leads, each with the model whose last effect it replaces.
+    """Return restarts with wider laws for axes that a plainer law leads.
+
+    Each comes with the model whose last effect it replaces.
 
     The table of effects names the law that an effect begins from. A candidate whose fit is already as good as that law
     is left out. ``offered``: returns candidates for the residual of a model.

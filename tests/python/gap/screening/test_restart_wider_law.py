@@ -55,3 +55,19 @@ def test_friction_of_the_motor_takes_over_no_side():
 )
 def test_it_is_left_alone_where_there_is_no_need(nothing):
     assert nothing() == []
+
+
+def test_stribeck_friction_worse_than_the_coulomb_friction_in_it_begins_there_at_each_start():
+    rises = Effect("stribeck_friction", 2, {"excess_nm": 0.1, "stribeck_speed_rad_s": 2.0})
+    falling = Hypothesis(
+        rises,
+        ("coulomb_nm", "excess_nm", "stribeck_speed_rad_s", "smoothing_rad_s"),
+        starts=({"excess_nm": 0.2, "stribeck_speed_rad_s": 20.0},),
+    )
+    found = begun(trial(EVEN, 100.0), trial(rises, 130.0), offered=(falling,))
+    taken = {"coulomb_nm": 0.5, "smoothing_rad_s": 0.3, "arm_share": 0.9}
+    assert [option.effect.parameters for _, option in found] == [
+        {"excess_nm": 0.1, "stribeck_speed_rad_s": 2.0, **taken},
+        {"excess_nm": 0.2, "stribeck_speed_rad_s": 20.0, **taken},
+    ]
+    assert begun(trial(EVEN, 100.0), trial(rises, 99.0), offered=(falling,)) == []
