@@ -69,7 +69,7 @@ def test_a_limit_that_is_not_reached_changes_nothing():
     ("run", "evaluations", "stage"),
     [
         (in_loop, 1, "screening"),
-        (in_loop, 120, "fitting"),
+        (in_loop, 110, "fitting"),
         (of_arm, 5, "screening"),
     ],
 )
