@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
+from axisight.errors import InputError
 from axisight.statistics.recursion import butterworth, recursive, zero_phase
 from axisight.statistics.spectral_density import welch
 
@@ -58,3 +59,9 @@ def test_a_diagnosis_does_not_wait_for_modules_it_hardly_uses(repository: Path, 
         name for name, text in texts.items() if "scipy.signal" in text or "scipy.stats" in text
     ]
     assert not loading
+
+
+@pytest.mark.parametrize(("above", "below"), [([1.0], [0.0, 1.0]), ([1.0], []), ([], [1.0])])
+def test_an_equation_without_a_present_is_refused(above: list[float], below: list[float]):
+    with pytest.raises(InputError, match="below: expected a first factor that is not zero"):
+        recursive(above, below, WALK)
