@@ -26,9 +26,9 @@ def begun_wider(
 ) -> list[tuple[FittedModel, Hypothesis]]:
     """Return restarts with wider laws for axes that a plainer law leads.
 
-    Each comes with the model whose last effect it replaces. The table of effects names the law that an
-    effect begins from. A candidate whose fit is already as good as that law is left out. ``offered``: returns candidates
-    for the residual of a model.
+    Each comes with the model whose last effect it replaces. The table of effects names the law that an effect begins
+    from. A candidate whose fit is already as good as that law is left out. ``offered``: returns candidates for the
+    residual of a model.
     """
     known = {t.label: t for t in trials}
     wider = [(info.name, info.begun_from) for info in effect_table().values() if info.begun_from]
