@@ -1,1 +1,1 @@
-"""Machines simulated by Drake and by Exudyn, written as public cases: see README.md in this folder."""
+"""Machines that Drake, Exudyn, DART and Bullet simulate, written as public cases: see README.md in this folder."""

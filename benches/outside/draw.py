@@ -21,6 +21,10 @@ WEIGHTS = {
     "elastic_loader": 0.35,
     "rigid_desk": 0.25,
     "rigid_offset": 0.15,
+    "elastic_rocker": 0.25,
+    "elastic_crane": 0.35,
+    "rigid_hanger": 0.25,
+    "rigid_forge": 0.15,
 }
 AXES = {
     "elastic_handler": 3,
@@ -31,6 +35,10 @@ AXES = {
     "elastic_loader": 3,
     "rigid_desk": 5,
     "rigid_offset": 6,
+    "elastic_rocker": 2,
+    "elastic_crane": 3,
+    "rigid_hanger": 4,
+    "rigid_forge": 6,
 }
 ALL = {arm: range(n) for arm, n in AXES.items()}
 WITH_GEARS = {arm: axes for arm, axes in ALL.items() if arm.startswith("elastic")}
@@ -44,6 +52,9 @@ WEIGHTLESS = {
     "elastic_loader": (0,),
     "rigid_desk": (0,),
     "rigid_offset": (0,),
+    "elastic_crane": (0,),
+    "rigid_hanger": (0,),
+    "rigid_forge": (0,),
 }
 WEIGHTLESS_GEARS = {arm: axes for arm, axes in WEIGHTLESS.items() if arm in WITH_GEARS}
 WITH_WEIGHT = {
@@ -54,6 +65,10 @@ WITH_WEIGHT = {
     "elastic_loader": (1, 2),
     "rigid_desk": (1, 2, 3),
     "rigid_offset": (1, 2, 3),
+    "elastic_rocker": (0, 1),
+    "elastic_crane": (1, 2),
+    "rigid_hanger": (1, 2),
+    "rigid_forge": (1, 2, 4),
 }
 # Links whose mass no other axis and no load on the last link replaces. On the first axis of a
 # horizontal arm a mass is one with an inertia.
@@ -66,6 +81,10 @@ INNER = {
     "elastic_loader": (1,),
     "rigid_desk": (1, 2),
     "rigid_offset": (1, 2),
+    "elastic_rocker": (0,),
+    "elastic_crane": (1,),
+    "rigid_hanger": (1, 2),
+    "rigid_forge": (1, 2),
 }
 # An inertia about the first axis of a rigid arm is one with its rotor.
 TURNING = {
@@ -77,6 +96,10 @@ TURNING = {
     "elastic_loader": (1, 2),
     "rigid_desk": (2, 3),
     "rigid_offset": (2, 3),
+    "elastic_rocker": (0, 1),
+    "elastic_crane": (1, 2),
+    "rigid_hanger": (1, 2),
+    "rigid_forge": (1, 2, 3),
 }
 
 
@@ -115,13 +138,19 @@ SINGLE: dict[str, Kind] = {
         WEIGHTLESS_GEARS,
         gears.piecewise_stiffness, gears.lost_motion, gears.gear_hysteresis,
     ),
-    **_kinds({"elastic_handler": (0,), "elastic_loader": (0,)}, loads.base_compliance),
+    **_kinds(
+        dict.fromkeys(("elastic_handler", "elastic_loader", "elastic_crane"), (0,)),
+        loads.base_compliance,
+    ),
     **_kinds(WEIGHTLESS, drives.torque_deadband),
     **_kinds(WITH_WEIGHT, loads.joint_zero_offset, loads.gravity_compensation),
     **_kinds(INNER, loads.link_mass, loads.link_com),
     **_kinds(TURNING, loads.link_inertia),
     **_kinds(WITHOUT_GEARS, loads.rotor_inertia),
-    **_kinds({"rigid_six": (4,), "rigid_desk": (3,), "rigid_offset": (4,)}, friction.axis_coupling),
+    **_kinds(
+        {"rigid_six": (4,), "rigid_desk": (3,), "rigid_offset": (4,), "rigid_forge": (4,)},
+        friction.axis_coupling,
+    ),
     **_kinds(dict.fromkeys(AXES, (0,)), loads.payload, loads.base_tilt, sensing.clock_drift),
 }  # fmt: skip
 
@@ -129,8 +158,10 @@ STRANGERS: dict[str, Kind] = {
     **_kinds(ALL, strangers.tone, strangers.late_brake, strangers.tight_spot, strangers.leaning,
              strangers.wall, strangers.dropouts),
     **_kinds(dict.fromkeys(("elastic_handler", "rigid_six", "rigid_stacker", "elastic_loader",
-                            "rigid_desk", "rigid_offset"), (1,)), strangers.strap),
-    **_kinds({arm: ALL[arm] for arm in ("elastic_handler", "elastic_scara", "elastic_loader")},
+                            "rigid_desk", "rigid_offset", "elastic_crane", "rigid_hanger",
+                            "rigid_forge"), (1,)), strangers.strap),
+    **_kinds({arm: ALL[arm] for arm in ("elastic_handler", "elastic_scara", "elastic_loader",
+                                        "elastic_crane")},
              strangers.cubic_damper),
 }  # fmt: skip
 

@@ -186,6 +186,92 @@ def rigid_offset() -> Arm:
     )  # fmt: skip
 
 
+def elastic_rocker() -> Arm:
+    """Return an arm of two crossed axes, both under weight: it rocks sideways and swings its arm."""
+    joints = (
+        Joint("rock", (0.0, 0.0, 0.6), "x", _link(38.0, (0.12, 0.03, 0.15), 0.7, 0.9, 0.6),
+              8.0e4, 80.0, 1 / 120, 4e-4, 8e-4),
+        Joint("swing", (0.25, 0.0, 0.32), "y",
+              _link(24.0, (0.33, 0.02, 0.05), 0.15, 1.1, 1.1, 0.02, -0.03, 0.01),
+              3.8e4, 38.0, 1 / 100, 2.5e-4, 5e-4),
+    )  # fmt: skip
+    return Arm(
+        "elastic rocker", "bullet", 1e-3, joints, "pi_velocity",
+        kp=np.array([0.055, 0.045]), ki=np.array([0.6, 0.5]), kv=np.zeros(2),
+        noise_std_rad=6e-5, pose_rad=np.array([0.2, 0.3]),
+        top_speed_rad_s=np.array([90.0, 90.0]),
+    )  # fmt: skip
+
+
+def elastic_crane() -> Arm:
+    """Return an arm of three axes: soft gears, a drive cascade, a forearm that bends sideways."""
+    joints = (
+        Joint("column", (0.0, 0.0, 0.5), "z", _link(150.0, (0.08, -0.02, 0.3), 8.0, 9.0, 6.0),
+              7.0e5, 520.0, 1 / 160, 2e-3, 2.5e-3),
+        Joint("lift", (0.22, 0.0, 0.45), "y", _link(85.0, (0.03, 0.04, 0.42), 6.5, 6.4, 1.0),
+              8.0e5, 600.0, 1 / 180, 2.2e-3, 2.8e-3),
+        Joint("reach", (0.0, 0.0, 0.9), "y", None, 3.6e5, 270.0, 1 / 150, 1.5e-3, 1.8e-3),
+        Joint("bend", (0.15, 0.0, 0.06), "z",
+              _link(70.0, (0.42, -0.03, 0.04), 0.9, 5.5, 5.6, 0.06, -0.12, 0.03), 6.0e5, 450.0),
+    )  # fmt: skip
+    return Arm(
+        "elastic crane", "bullet", 1e-3, joints, "cascade",
+        kp=np.array([0.3, 0.3, 0.19]), ki=np.array([2.4, 2.4, 1.5]),
+        kv=np.array([10.0, 10.0, 10.0]),
+        noise_std_rad=5e-5, pose_rad=np.array([0.15, 0.25, 0.1]),
+        top_speed_rad_s=np.array([110.0, 95.0, 110.0]),
+    )  # fmt: skip
+
+
+def rigid_hanger() -> Arm:
+    """Return a rigid arm of four axes that hangs from a ceiling and weighs 30 kg."""
+    joints = (
+        Joint("turn", (0.0, 0.0, -0.2), "z", _link(9.0, (0.02, 0.01, -0.08), 0.06, 0.06, 0.04),
+              ratio=1 / 90, motor_inertia=1.2e-4, viscous=3e-4),
+        Joint("shoulder", (0.05, 0.0, -0.15), "y",
+              _link(11.0, (0.0, -0.02, -0.22), 0.25, 0.24, 0.04),
+              ratio=1 / 110, motor_inertia=1.3e-4, viscous=4e-4),
+        Joint("elbow", (0.0, 0.0, -0.42), "y", _link(6.5, (0.03, 0.02, -0.18), 0.1, 0.1, 0.02),
+              ratio=1 / 90, motor_inertia=7e-5, viscous=2e-4),
+        Joint("wrist", (0.0, 0.0, -0.38), "z", _link(3.5, (0.06, 0.03, -0.07), 0.014, 0.014, 0.01),
+              ratio=1 / 50, motor_inertia=2e-5, viscous=5e-5),
+    )  # fmt: skip
+    return Arm(
+        "rigid hanging arm", "bullet", 2e-3, joints, "pi_velocity",
+        kp=np.array([0.011, 0.03, 0.014, 0.002]), ki=np.array([0.07, 0.19, 0.09, 0.013]),
+        kv=np.zeros(4),
+        noise_std_rad=8e-5, pose_rad=np.array([0.2, 0.5, -1.2, 0.3]),
+        top_speed_rad_s=np.array([80.0, 80.0, 80.0, 70.0]),
+    )  # fmt: skip
+
+
+def rigid_forge() -> Arm:
+    """Return a rigid arm of six axes that weighs 450 kg and holds 45 kg beside its last axis."""
+    joints = (
+        Joint("base", (0.0, 0.0, 0.6), "z", _link(160.0, (0.1, 0.02, 0.1), 9.0, 9.0, 8.0),
+              ratio=1 / 200, motor_inertia=4e-3, viscous=6e-3),
+        Joint("shoulder", (0.35, 0.0, 0.25), "y", _link(110.0, (0.04, -0.08, 0.5), 14.0, 13.0, 2.5),
+              ratio=1 / 210, motor_inertia=4e-3, viscous=6e-3),
+        Joint("elbow", (0.0, 0.0, 1.1), "y", _link(75.0, (0.2, 0.06, 0.12), 2.0, 5.0, 5.0),
+              ratio=1 / 190, motor_inertia=2.8e-3, viscous=4e-3),
+        Joint("roll", (0.45, 0.0, 0.2), "x", _link(40.0, (0.4, 0.01, 0.02), 0.5, 2.2, 2.2),
+              ratio=1 / 140, motor_inertia=9e-4, viscous=1.5e-3),
+        Joint("bend", (0.9, 0.0, 0.0), "y", _link(18.0, (0.06, 0.0, 0.01), 0.2, 0.22, 0.22),
+              ratio=1 / 120, motor_inertia=5e-4, viscous=9e-4),
+        Joint("flange", (0.2, 0.0, 0.0), "x",
+              _link(45.0, (0.15, 0.06, 0.08), 0.9, 1.1, 1.0, -0.05, 0.04, 0.02),
+              ratio=1 / 90, motor_inertia=4e-4, viscous=8e-4),
+    )  # fmt: skip
+    return Arm(
+        "rigid forging arm", "bullet", 2e-3, joints, "cascade",
+        kp=np.array([0.9, 0.9, 0.5, 0.07, 0.05, 0.04]),
+        ki=np.array([6.0, 6.0, 3.4, 0.5, 0.35, 0.28]),
+        kv=np.array([8.0, 8.0, 8.0, 9.0, 9.0, 9.0]),
+        noise_std_rad=7e-5, pose_rad=np.array([0.1, 0.3, 0.2, 0.3, 0.6, 0.2]),
+        top_speed_rad_s=np.array([100.0, 100.0, 100.0, 90.0, 90.0, 80.0]),
+    )  # fmt: skip
+
+
 ARMS = {
     "elastic_handler": elastic_handler,
     "elastic_reacher": elastic_reacher,
@@ -195,6 +281,10 @@ ARMS = {
     "elastic_loader": elastic_loader,
     "rigid_desk": rigid_desk,
     "rigid_offset": rigid_offset,
+    "elastic_rocker": elastic_rocker,
+    "elastic_crane": elastic_crane,
+    "rigid_hanger": rigid_hanger,
+    "rigid_forge": rigid_forge,
 }
 
 

@@ -4,7 +4,7 @@ from importlib import import_module
 
 import pytest
 
-DRAWS = {"two engines": ["drake", "exudyn"], "DART": ["dart"]}
+DRAWS = {"two engines": ["drake", "exudyn"], "DART": ["dart"], "Bullet": ["bullet"]}
 
 
 @pytest.fixture
