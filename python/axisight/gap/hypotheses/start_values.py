@@ -465,15 +465,15 @@ def _warming(trial: StartContext) -> Hypothesis:
     return replace(begin, bounds={"time_constant_s": (least, most)})
 
 
-# Range of the relative change of a link's mass or inertia [1], a factor of four to both sides, and of the shift of its
-# centre of mass [m]. A larger difference means another link, and another cause is more likely.
-_FOURFOLD = (-0.75, 3.0)
+# Range of the relative change of a link's mass or inertia [1], and of the shift of its centre of mass [m]. A larger
+# difference means another link, and another cause is more likely.
+_OF_LINK = (-0.75, 1.0)
 _DISTANCE_M = 0.5
 
 
 def _link_share(trial: StartContext) -> Hypothesis:
-    """Start at the neutral value; a link is at most four times as heavy as in the model, and no less than a quarter."""
-    return replace(_neutral(trial), bounds={p.name: _FOURFOLD for p in trial.info.parameters})
+    """Start at the neutral value; a link is at most twice as heavy as in the model, and at least a quarter."""
+    return replace(_neutral(trial), bounds={p.name: _OF_LINK for p in trial.info.parameters})
 
 
 def _link_place(trial: StartContext) -> Hypothesis:
