@@ -6,6 +6,8 @@ arm only through its gear; one behind a rigid gear turns with its joint.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 
 from .loop import SUBSTEPS, Loop
@@ -14,7 +16,7 @@ from .loop import SUBSTEPS, Loop
 DUST_KG, DUST_KG_M2 = 1e-9, 1e-12
 
 
-class Chain:
+class Chain(ABC):
     """Coordinates and torques of a machine; a subclass holds its bodies in an engine."""
 
     def __init__(self, loop: Loop):
@@ -56,9 +58,9 @@ class Chain:
             phi[axis], w[axis] = state[rotor], state[size + rotor]
         return phi, w, q, v
 
+    @abstractmethod
     def rate(self, t: float, state: np.ndarray) -> np.ndarray:
         """Return the derivative of coordinates and rates."""
-        raise NotImplementedError
 
     def torques(self, t: float, state: list[float]) -> list[float]:
         """Return the torques of motors, gears, springs and laws on all coordinates [Nm]."""

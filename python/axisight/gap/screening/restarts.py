@@ -1,8 +1,8 @@
 """Fits hypotheses again that replace the leader of an axis, starting from the leader's fit.
 
 Some minima are too narrow for start values from data. Three kinds of restarts exist: gear laws on the curve of another
-law, stiction after pre-sliding, and laws of friction after a plainer one. If one hypothesis has several
-starts, one linear step selects those that get a fit.
+law, stiction after pre-sliding, and laws of friction after a plainer one. If one hypothesis has several starts, one
+linear step selects those that get a fit.
 """
 
 from __future__ import annotations

@@ -158,22 +158,20 @@ class Screening:
 
     def groups(self, options: Sequence[Hypothesis]) -> list[list[Hypothesis]]:
         """Return the candidates grouped by evaluation: those without effect at their start values share one."""
-        alone: list[Hypothesis] = []
-        together: list[Hypothesis] = []
-        for option in options:
-            few = len(self.felt(option).free) <= _TOGETHER
-            (together if self.idle(option) and few else alone).append(option)
+        sized = [(len(self.felt(option).free), option) for option in options]
+        fits = [self.idle(option) and size <= _TOGETHER for size, option in sized]
+        alone = [[option] for option, shares in zip(options, fits, strict=True) if not shares]
+        together = [one for one, shares in zip(sized, fits, strict=True) if shares]
         groups: list[list[Hypothesis]] = []
         left: list[int] = []
-        for option in sorted(together, key=lambda o: -len(self.felt(o).free)):
-            size = len(self.felt(option).free)
+        for size, option in sorted(together, key=lambda one: -one[0]):
             at = next((i for i, room in enumerate(left) if size <= room), len(groups))
             if at == len(groups):
                 groups.append([])
                 left.append(_TOGETHER)
             groups[at].append(option)
             left[at] -= size
-        return [[option] for option in alone] + groups
+        return alone + groups
 
     def starts(self, group: list[Hypothesis]) -> list[Start]:
         """Return the best start of each candidate of a group, with its predicted gain."""

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from axisight.effects import Effect, effect_info
-from axisight.gap.simulator.stated_amplitude import stated_amplitude
+from axisight.gap.simulator.stated_amplitude import stated_values
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -103,14 +103,16 @@ class NaturalSizes:
         It alone gives three times the largest torque of the motor then, and another effect has to take that away again.
         An effect on several axes has the size of the strongest. What the simulator states may be that large.
         """
-        stated = abs(stated_amplitude(effect, self.robot))
+        stated = stated_values(effect, self.robot)
         axes = [a for i, a in enumerate(self.axes, 1) if effect.acts_on(i)]
         sizes = {
             p.name: _FAR_FETCHED * max((a.of_torque(p.unit) or 0.0 for a in axes), default=0.0)
             for p in effect_info(effect.name).parameters
             if p.role == "amplitude"
         }
-        return {name: max(size, stated) for name, size in sizes.items() if size > 0}
+        return {
+            name: max(size, abs(stated.get(name, 0.0))) for name, size in sizes.items() if size > 0
+        }
 
     def _axis(self, place: int) -> AxisSizes:
         joint = self.robot.joints[self.robot.axis_joints[place]]

@@ -8,10 +8,17 @@ from axisight.robot import Robot
 
 def stated_amplitude(effect: Effect, robot: Robot) -> float:
     """Return the amplitude that a simulator states for an effect, as its own parameter or as an effect; else zero."""
-    own = own_parameter(robot, effect)
+    return stated_values(effect, robot)[effect_info(effect.name).parameters[0].name]
+
+
+def stated_values(effect: Effect, robot: Robot) -> dict[str, float]:
+    """Return what a simulator states of an effect, by parameter; its own parameter counts as the first one."""
+    first, *others = (p.name for p in effect_info(effect.name).parameters)
     acting = (e for e in robot.effects if e.label == effect.label and e.acts)
-    beside = next((e.values()[0] for e in acting), 0.0)
-    return beside + (0.0 if own is None else robot.parameters()[own])
+    values = next((dict(zip((first, *others), e.values(), strict=True)) for e in acting), {})
+    own = own_parameter(robot, effect)
+    added = 0.0 if own is None else robot.parameters()[own]
+    return {**values, first: values.get(first, 0.0) + added}
 
 
 def own_parameter(robot: Robot, effect: Effect) -> str | None:

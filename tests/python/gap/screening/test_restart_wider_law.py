@@ -1,4 +1,4 @@
-"""Dry friction that changes with the angle begins where friction that is the same everywhere ended."""
+"""A law of friction begins where a plainer law that it contains ended."""
 
 from types import SimpleNamespace
 

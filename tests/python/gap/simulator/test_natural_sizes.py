@@ -80,6 +80,10 @@ def test_what_is_far_fetched_is_three_times_the_torque_of_the_motor(small: Robot
     assert NaturalSizes(placeholder, logs).largest(Effect("coulomb_friction", 2)) == {
         "coulomb_nm": pytest.approx(50.0 * torque)
     }
+    # Each number of an effect has its own.
+    cable = Effect("cable_stiffness", 2, {"stiffness_nm_rad": 1e7, "at_zero_nm": 0.0})
+    held = NaturalSizes(small.with_effects([cable]), logs).largest(Effect("cable_stiffness", 2))
+    assert held == {"stiffness_nm_rad": 1e7, "at_zero_nm": spring["at_zero_nm"]}
     # What is no torque has no such size, and an axis without torque gives none.
     assert sizes.largest(Effect("payload", None)) == sizes.largest(Effect("backlash", 2)) == {}
     still = [replace(x, torque_nm=np.zeros_like(x.torque_nm)) for x in logs]
