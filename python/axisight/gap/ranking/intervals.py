@@ -11,6 +11,7 @@ import numpy as np
 from axisight.effects import Effect, effect_info
 from axisight.gap.facts.named_cause import NamedCause
 from axisight.gap.facts.result import Interval
+from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.statistics.intervals import NORMAL_DEVIATIONS
 
 
@@ -41,20 +42,29 @@ def intervals(
     return out
 
 
-def of_sure_size(
-    effect: Effect, free: Sequence[str], std: dict[str, float], stated: Mapping[str, float]
-) -> bool:
-    """Whether the interval of a fitted amplitude leaves out that the machine has no more than the simulator.
+def sureness(effect: Effect, fitted: Hypothesis, std: Mapping[str, float]) -> float:
+    """Return by how many half-widths of its interval a fitted amplitude differs from what the simulator has.
 
-    ``stated``: what the simulator has; nothing by default. True if no amplitude of the effect was fitted.
+    The largest over all amplitudes. At most one: the interval includes that the machine has no more than the simulator.
+    Infinite if no amplitude of the effect was fitted. ``fitted``: the hypothesis that ``effect`` comes from.
     """
     table = {p.name: p for p in effect_info(effect.name).parameters if p.role == "amplitude"}
-    found = intervals(effect, free, std)
-    return not any(name in found for name in table) or any(
-        not found[name].low <= stated.get(name, p.neutral) <= found[name].high
+    found = intervals(effect, fitted.free, std, fitted.sure)
+    shares = (
+        _half_widths(found[name], fitted.stated.get(name, p.neutral))
         for name, p in table.items()
         if name in found
     )
+    return max(shares, default=np.inf)
+
+
+def _half_widths(found: Interval, nothing: float) -> float:
+    """Return the distance of a value from ``nothing``, by the half-width of its interval.
+
+    A bound of the effect may cut off one side of the interval.
+    """
+    half = max(found.value - found.low, found.high - found.value)
+    return abs(found.value - nothing) / half if half > 0 else np.inf
 
 
 def with_own_scatter(

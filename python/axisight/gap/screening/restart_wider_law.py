@@ -2,7 +2,7 @@
 
 Its start values are estimated from the residual of a model. While that residual still holds all dry friction and other
 errors, the estimate may be wrong and the fit ends in a local minimum. A law that contains another can fit no worse than
-the contained one, so a worse fit is repeated.
+the contained one, so a fit that gains nothing by its further numbers is repeated.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.posterior import AxisPosterior
 
-# Smallest share of the explainable error that the plainer law must leave before a wider one is fitted.
+# Smallest share of the explainable error that the plainer law must leave before a wider one is fitted, and smallest
+# share of the plainer law's loss that a wider fit must remove to count.
 _LEAVES = 0.01
 
 
@@ -27,7 +28,7 @@ def begun_wider(
     """Return restarts with wider laws for axes that a plainer law leads.
 
     Each comes with the model whose last effect it replaces. The table of effects names the law that an effect begins
-    from. A candidate whose fit is already as good as that law is left out. ``offered``: returns candidates for the
+    from. A candidate that already fits better than that law is left out. ``offered``: returns candidates for the
     residual of a model.
     """
     known = {t.label: t for t in trials}
@@ -40,8 +41,10 @@ def begun_wider(
             continue
         for name, begun in wider:
             label = Effect(name, effect.axis).label
-            tried = label in known and known[label].fitted.total <= plain.fitted.total
-            if effect.name == begun.law and not tried:
+            gains = (
+                label in known and known[label].fitted.total < (1 - _LEAVES) * plain.fitted.total
+            )
+            if effect.name == begun.law and not gains:
                 options = (o for o in offered(plain.fitted) if o.effect.label == label)
                 taken = _taken_over(effect, begun)
                 out += [

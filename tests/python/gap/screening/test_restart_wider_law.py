@@ -25,7 +25,11 @@ def begun(even, *others, score: float = 0.9, axis: int = 1, offered=(UNEVEN,)):
     return begun_wider([standing], [even, *others], lambda fitted: list(offered))
 
 
-@pytest.mark.parametrize("tried", [(), (trial(UNEVEN.effect, 200.0),)], ids=["not", "worse"])
+@pytest.mark.parametrize(
+    "tried",
+    [(), (trial(UNEVEN.effect, 200.0),), (trial(UNEVEN.effect, 99.5),)],
+    ids=["not", "worse", "no better"],
+)
 def test_uneven_friction_takes_over_size_corner_and_side(tried):
     even = trial(EVEN, 100.0)
     ((model, option),) = begun(even, *tried)
@@ -70,4 +74,4 @@ def test_stribeck_friction_worse_than_the_coulomb_friction_in_it_begins_there_at
         {"excess_nm": 0.1, "stribeck_speed_rad_s": 2.0, **taken},
         {"excess_nm": 0.2, "stribeck_speed_rad_s": 20.0, **taken},
     ]
-    assert begun(trial(EVEN, 100.0), trial(rises, 99.0), offered=(falling,)) == []
+    assert begun(trial(EVEN, 100.0), trial(rises, 90.0), offered=(falling,)) == []

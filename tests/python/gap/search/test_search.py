@@ -284,3 +284,24 @@ def test_what_diverges_together_is_told_and_not_tried_again(monkeypatch):
     assert len(state.rounds) == 2
     assert len(tried) == 1
     assert state.skipped == {"coulomb_friction@1": "the simulation failed: diverged at sample 5"}
+
+
+def led_by(axis: int, label: str, total: float) -> SimpleNamespace:
+    trial = SimpleNamespace(label=label, fitted=SimpleNamespace(total=total))
+    return SimpleNamespace(axis=axis, best=SimpleNamespace(trial=trial))
+
+
+def test_the_leader_that_fits_best_comes_first_whatever_is_left_out():
+    # The load predicts axis 2 better without a log; the centre of mass of axis 1 does not act there, and fits better.
+    load, link = led_by(1, "payload", 1133.0), led_by(0, "link_com@1", 1121.0)
+    fall = np.array([[9000.0, 4000.0], [9010.0, 3500.0]])
+    place = {"payload": 0, "link_com@1": 1}
+    assert search.best_fit_first([load, link], fall, place) == [link, load]
+
+
+def test_a_leader_of_two_axes_comes_with_the_axis_where_its_loss_falls_most():
+    here, there = led_by(0, "payload", 50.0), led_by(1, "payload", 50.0)
+    assert search.best_fit_first([here, there], np.array([[1.0, 8.0]]), {"payload": 0}) == [
+        there,
+        here,
+    ]
