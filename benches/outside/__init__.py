@@ -1,1 +1,1 @@
-"""Machines that Drake, Exudyn, DART and Bullet simulate, written as public cases: see README.md in this folder."""
+"""Machines of Drake, Exudyn, DART, Bullet and Jiminy, written as public cases: see README.md in this folder."""

@@ -1,4 +1,4 @@
-"""Make cases of machines that Drake, Exudyn, DART and Bullet simulate.
+"""Make cases of machines that Drake, Exudyn, DART, Bullet and Jiminy simulate.
 
 python -m outside make CASES --truth FOLDER [--seed N] [--count N] [--engines NAME ...]
 python -m outside nominal FOLDER [--engines NAME ...]
@@ -24,7 +24,7 @@ from .make import changed, make, place, runs, write
 from .models import ARMS, arms_of
 from .motions import plan
 
-ENGINES = ("drake", "exudyn", "dart", "bullet")
+ENGINES = ("drake", "exudyn", "dart", "bullet", "jiminy")
 
 
 def nominal(folder: Path, engines: list[str]) -> None:

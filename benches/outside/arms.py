@@ -28,6 +28,15 @@ class Link:
         return Link(total, com, inertia)
 
 
+def body(mass_kg: float, com_m: tuple[float, ...], *inertia_kg_m2: float) -> Link:
+    """Return a link; inertias xx, yy, zz about the centre of mass, then xy, xz, yz if not zero [kg m^2]."""
+    xx, yy, zz, *mixed = inertia_kg_m2
+    xy, xz, yz = mixed or (0.0, 0.0, 0.0)
+    return Link(
+        mass_kg, np.array(com_m), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=float)
+    )
+
+
 @dataclass(frozen=True)
 class Joint:
     """A joint of the chain. ``ratio`` is joint angle per motor angle; None: elastic, without a motor.

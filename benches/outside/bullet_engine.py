@@ -16,13 +16,13 @@ import numpy as np
 import pybullet
 
 from .arms import Arm, Joint, Link
-from .chain import DUST_KG, DUST_KG_M2, Chain, march
+from .chain import DUST_KG, DUST_KG_M2, Stepped, march
 from .loop import Loop
 
 DUST = Link(DUST_KG, np.zeros(3), DUST_KG_M2 * np.eye(3))
 
 
-class Plant(Chain):
+class Plant(Stepped):
     """A machine in Bullet."""
 
     def __init__(self, loop: Loop):

@@ -1,4 +1,4 @@
-"""A machine whose steps are taken beside its engine: coordinates, and torques on them.
+"""Coordinates of a machine and the torques on them; steps for an engine whose own are too coarse.
 
 Coordinates are the joints of the chain, then the rotors of elastic gears. A rotor of its own meets the
 arm only through its gear; one behind a rigid gear turns with its joint.
@@ -16,7 +16,7 @@ from .loop import SUBSTEPS, Loop
 DUST_KG, DUST_KG_M2 = 1e-9, 1e-12
 
 
-class Chain(ABC):
+class Chain:
     """Coordinates and torques of a machine; a subclass holds its bodies in an engine."""
 
     def __init__(self, loop: Loop):
@@ -58,10 +58,6 @@ class Chain(ABC):
             phi[axis], w[axis] = state[rotor], state[size + rotor]
         return phi, w, q, v
 
-    @abstractmethod
-    def rate(self, t: float, state: np.ndarray) -> np.ndarray:
-        """Return the derivative of coordinates and rates."""
-
     def torques(self, t: float, state: list[float]) -> list[float]:
         """Return the torques of motors, gears, springs and laws on all coordinates [Nm]."""
         loop, out = self.loop, [0.0] * self.size
@@ -96,7 +92,15 @@ class Chain(ABC):
         return loads
 
 
-def march(chain: Chain) -> None:
+class Stepped(Chain, ABC):
+    """A machine whose steps are taken beside its engine."""
+
+    @abstractmethod
+    def rate(self, t: float, state: np.ndarray) -> np.ndarray:
+        """Return the derivative of coordinates and rates."""
+
+
+def march(chain: Stepped) -> None:
     """Simulate all samples of the loop of a machine, a Runge-Kutta step of order four a substep.
 
     Raises RuntimeError if the state does not stay finite.
@@ -109,7 +113,7 @@ def march(chain: Chain) -> None:
         state = _after(chain, step * loop.h, state, loop.h)
 
 
-def _after(chain: Chain, t: float, state: np.ndarray, h: float) -> np.ndarray:
+def _after(chain: Stepped, t: float, state: np.ndarray, h: float) -> np.ndarray:
     """Return the state after a Runge-Kutta step of order four."""
     first = chain.rate(t, state)
     second = chain.rate(t + h / 2, state + h / 2 * first)

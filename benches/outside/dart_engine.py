@@ -12,14 +12,14 @@ from dartpy.dynamics import Inertia, Skeleton
 from dartpy.math import Isometry3
 
 from .arms import Joint
-from .chain import DUST_KG, DUST_KG_M2, Chain, march
+from .chain import DUST_KG, DUST_KG_M2, Stepped, march
 from .loop import Loop
 
 # Rotors turn about their own centre of mass, so that only their inertia about it counts.
 ROTOR_KG = 1.0
 
 
-class Plant(Chain):
+class Plant(Stepped):
     """A machine in DART, rotors of elastic gears included."""
 
     def __init__(self, loop: Loop):

@@ -25,6 +25,10 @@ WEIGHTS = {
     "elastic_crane": 0.35,
     "rigid_hanger": 0.25,
     "rigid_forge": 0.15,
+    "elastic_palletizer": 0.35,
+    "elastic_mount": 0.25,
+    "rigid_welder": 0.25,
+    "rigid_assembler": 0.25,
 }
 AXES = {
     "elastic_handler": 3,
@@ -39,6 +43,10 @@ AXES = {
     "elastic_crane": 3,
     "rigid_hanger": 4,
     "rigid_forge": 6,
+    "elastic_palletizer": 4,
+    "elastic_mount": 2,
+    "rigid_welder": 5,
+    "rigid_assembler": 4,
 }
 ALL = {arm: range(n) for arm, n in AXES.items()}
 WITH_GEARS = {arm: axes for arm, axes in ALL.items() if arm.startswith("elastic")}
@@ -55,6 +63,10 @@ WEIGHTLESS = {
     "elastic_crane": (0,),
     "rigid_hanger": (0,),
     "rigid_forge": (0,),
+    "elastic_palletizer": (0,),
+    "elastic_mount": (0,),
+    "rigid_welder": (0,),
+    "rigid_assembler": (0, 1, 2),
 }
 WEIGHTLESS_GEARS = {arm: axes for arm, axes in WEIGHTLESS.items() if arm in WITH_GEARS}
 WITH_WEIGHT = {
@@ -69,6 +81,10 @@ WITH_WEIGHT = {
     "elastic_crane": (1, 2),
     "rigid_hanger": (1, 2),
     "rigid_forge": (1, 2, 4),
+    "elastic_palletizer": (1, 2),
+    "elastic_mount": (1,),
+    "rigid_welder": (1, 2, 4),
+    "rigid_assembler": (3,),
 }
 # Links whose mass no other axis and no load on the last link replaces. On the first axis of a
 # horizontal arm a mass is one with an inertia.
@@ -85,6 +101,9 @@ INNER = {
     "elastic_crane": (1,),
     "rigid_hanger": (1, 2),
     "rigid_forge": (1, 2),
+    "elastic_palletizer": (1,),
+    "rigid_welder": (1, 2),
+    "rigid_assembler": (1,),
 }
 # An inertia about the first axis of a rigid arm is one with its rotor.
 TURNING = {
@@ -100,6 +119,10 @@ TURNING = {
     "elastic_crane": (1, 2),
     "rigid_hanger": (1, 2),
     "rigid_forge": (1, 2, 3),
+    "elastic_palletizer": (1, 2),
+    "elastic_mount": (1,),
+    "rigid_welder": (1, 2),
+    "rigid_assembler": (1,),
 }
 
 
@@ -139,7 +162,9 @@ SINGLE: dict[str, Kind] = {
         gears.piecewise_stiffness, gears.lost_motion, gears.gear_hysteresis,
     ),
     **_kinds(
-        dict.fromkeys(("elastic_handler", "elastic_loader", "elastic_crane"), (0,)),
+        dict.fromkeys(
+            ("elastic_handler", "elastic_loader", "elastic_crane", "elastic_palletizer"), (0,)
+        ),
         loads.base_compliance,
     ),
     **_kinds(WEIGHTLESS, drives.torque_deadband),
@@ -148,7 +173,8 @@ SINGLE: dict[str, Kind] = {
     **_kinds(TURNING, loads.link_inertia),
     **_kinds(WITHOUT_GEARS, loads.rotor_inertia),
     **_kinds(
-        {"rigid_six": (4,), "rigid_desk": (3,), "rigid_offset": (4,), "rigid_forge": (4,)},
+        {"rigid_six": (4,), "rigid_desk": (3,), "rigid_offset": (4,), "rigid_forge": (4,),
+         "rigid_welder": (3,)},
         friction.axis_coupling,
     ),
     **_kinds(dict.fromkeys(AXES, (0,)), loads.payload, loads.base_tilt, sensing.clock_drift),
@@ -159,9 +185,10 @@ STRANGERS: dict[str, Kind] = {
              strangers.wall, strangers.dropouts),
     **_kinds(dict.fromkeys(("elastic_handler", "rigid_six", "rigid_stacker", "elastic_loader",
                             "rigid_desk", "rigid_offset", "elastic_crane", "rigid_hanger",
-                            "rigid_forge"), (1,)), strangers.strap),
+                            "rigid_forge", "elastic_palletizer", "rigid_welder",
+                            "rigid_assembler"), (1,)), strangers.strap),
     **_kinds({arm: ALL[arm] for arm in ("elastic_handler", "elastic_scara", "elastic_loader",
-                                        "elastic_crane")},
+                                        "elastic_crane", "elastic_palletizer")},
              strangers.cubic_damper),
 }  # fmt: skip
 

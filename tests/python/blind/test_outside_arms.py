@@ -4,7 +4,12 @@ from importlib import import_module
 
 import pytest
 
-DRAWS = {"two engines": ["drake", "exudyn"], "DART": ["dart"], "Bullet": ["bullet"]}
+DRAWS = {
+    "two engines": ["drake", "exudyn"],
+    "DART": ["dart"],
+    "Bullet": ["bullet"],
+    "Jiminy": ["jiminy"],
+}
 
 
 @pytest.fixture
