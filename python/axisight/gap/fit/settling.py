@@ -27,26 +27,28 @@ def settled(
     """Return a fit with sensitivities of its own, renewed as often as it needs.
 
     ``rough``: fitter for part of the data, which makes most of the way at lower cost; ``worth``: fall of the loss at
-    which the fit ends, in place of a relative one.
+    which the fit ends, by default where it has settled.
     """
+    least = SETTLED * start.total if worth is None else worth
     if start.renewed and len(free) == len(start.free):
-        return _renewed(fitter, start, max_iterations)
+        return _renewed(fitter, start, max_iterations, least)
     renewals = RENEWALS
-    if rough is not None:
-        begun = _renewed(rough, rough.fit(free, start, refreshes=renewals), max_iterations)
+    if rough is not None and not (len(free) == len(start.free) and has_settled(start)):
+        begun = rough.fit(free, start, refreshes=renewals, worth=least)
+        begun = _renewed(rough, begun, max_iterations, least)
         if not isinstance(begun, Diverged):
             start, free, renewals = begun, begun.free, 0
-    found = fitter.fit(free, start, refreshes=renewals, worth=worth)
-    return _renewed(fitter, found, max_iterations)
+    found = fitter.fit(free, start, refreshes=renewals, worth=least)
+    return _renewed(fitter, found, max_iterations, least)
 
 
 def _renewed(
-    fitter: ModelFitter, found: FittedModel | Diverged, max_iterations: int
+    fitter: ModelFitter, found: FittedModel | Diverged, max_iterations: int, worth: float
 ) -> FittedModel | Diverged:
     """Return a fit; if it has not settled, continued with new sensitivities at every step."""
     if isinstance(found, Diverged) or has_settled(found):
         return found
-    return fitter.fit(found.free, found, fresh=True, max_iterations=max_iterations)
+    return fitter.fit(found.free, found, fresh=True, max_iterations=max_iterations, worth=worth)
 
 
 def has_settled(found: FittedModel) -> bool:

@@ -14,6 +14,7 @@ from axisight.fitting.divergence import Diverged
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.held_out import linear_gain
 from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.fit.settling import RENEWALS
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.posterior import AxisPosterior
 
@@ -29,7 +30,8 @@ def lags_beside(standing: AxisPosterior) -> list[FittedHypothesis]:
     if not _is_of(standing.axis, standing.best.trial):
         return []
     least = standing.best.score - _NEAR
-    return [r.trial for r in standing.ranked if r.score > least and _is_of(standing.axis, r.trial)]
+    near = (r for r in standing.ranked if r.score > least and standing.in_reach(r))
+    return [r.trial for r in near if _is_of(standing.axis, r.trial)]
 
 
 def _is_of(axis: int, one: FittedHypothesis) -> bool:
@@ -55,7 +57,7 @@ def ended(
         begun = _begun_as(other, info.name, info.resembles, options)
         if begun is None or (mine is not None and mine.total <= other.total):
             continue
-        again = fitter.fit(begun, other, fresh=True, max_iterations=_STEPS, worth=_WORTH)
+        again = fitter.fit(begun, other, refreshes=RENEWALS, max_iterations=_STEPS, worth=_WORTH)
         # If it diverges, the fit from the first start stays.
         if not isinstance(again, Diverged) and (mine is None or again.total < mine.total):
             found[info.name] = again
@@ -65,7 +67,7 @@ def ended(
 def _ended(fitter: ModelFitter, fitted: FittedModel) -> FittedModel:
     if fitted.renewed and linear_gain(fitted) < _WORTH:
         return fitted
-    found = fitter.fit(fitted.free, fitted, fresh=True, max_iterations=_STEPS, worth=_WORTH)
+    found = fitter.fit(fitted.free, fitted, refreshes=RENEWALS, max_iterations=_STEPS, worth=_WORTH)
     return fitted if isinstance(found, Diverged) else found
 
 

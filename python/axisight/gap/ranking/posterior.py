@@ -42,6 +42,9 @@ class RankedHypothesis:
         return effect_info(self.trial.hypothesis.effect.name).family
 
 
+# Odds against the leader that no better fit makes up for: it would have to leave a fifth of the loss it leaves now.
+_OUT_OF_REACH = 1e-20
+
 # Ratio of probabilities from which two hypotheses count as equally likely; fits are not more exact.
 _AS_LIKELY = 0.99
 
@@ -76,6 +79,10 @@ class AxisPosterior:
     def best(self) -> RankedHypothesis:
         """The most probable candidate."""
         return self.ranked[0]
+
+    def in_reach(self, one: RankedHypothesis) -> bool:
+        """Whether a candidate may lead after a better fit of its own."""
+        return one.probability > _OUT_OF_REACH * self.best.probability
 
     def adjusted(self, rule: str, odds: Mapping[str, float]) -> AxisPosterior:
         """Return the posterior with the odds of candidates, by label, multiplied by a factor."""

@@ -30,6 +30,8 @@ A = TypeVar("A")
 _TOGETHER = 4
 # Largest number of evaluations between two start values of an effect.
 _SCANS = 10
+# Difference of two losses, as a share, that is next to nothing.
+_SAME = 1e-4
 # Share of the loss that the first start must promise if it has an effect: each further start then costs a simulation.
 _LEAST_GAIN = 0.002
 # The logs of the last screening stay in use if they hold this share of the error that the same number of logs can hold.
@@ -272,7 +274,11 @@ class Screening:
     def _along(
         self, option: Hypothesis, begin: Sequence[float], robot_values: Mapping[str, float]
     ) -> Start:
-        """Return the best start of a candidate with one free parameter, searched at ``begin`` and between."""
+        """Return the best start of a candidate with one free parameter, searched at ``begin`` and between.
+
+        If the smallest and the largest value have the same loss, the effect does not act: a gear that is always loaded
+        shows no play, however wide.
+        """
         name = option.free[0]
 
         def loss(value: float) -> float:
@@ -280,7 +286,10 @@ class Screening:
             return np.inf if found is None else found
 
         values = sorted(begin)
-        losses = [loss(v) for v in values]
+        first, last = loss(values[0]), loss(values[-1])
+        if abs(last - first) <= _SAME * abs(first) < np.inf:
+            return Start(option.at({name: values[0]}), robot_values, self.model.total - first)
+        losses = [first, *map(loss, values[1:-1]), last][: len(values)]
         at = int(np.argmin(losses))
         least, value = losses[at], values[at]
         if least < self.model.total:

@@ -483,6 +483,7 @@ class SearchRound:
                 here = place in (None, standing.axis + 1) or label in leaders
                 share = _FAR if label in usual else close
                 near = r.score > max(0.5 * self.settings.smallest_score, share * leader.score)
+                near &= leader.trial.label not in self.done or standing.in_reach(r)
                 # A law at its bound may be the common look-alike, however poor the fit of that was.
                 near = near or label in special
                 if here and near and label not in self.done and r.trial not in out:

@@ -197,13 +197,15 @@ class _Contest:
     def with_second_fits(
         self, standing: AxisPosterior, present: FittedHypothesis
     ) -> list[FittedHypothesis]:
-        """Return the trials, fitted again with their own sensitivities: all rivals of one cause, the best of several.
+        """Return the trials, fitted again with their own sensitivities: rivals of one cause, the best of several.
 
-        A trial that diverges is left out.
+        Rivals out of reach keep their fits. A trial that diverges is left out.
         """
-        rivals = [r.trial for r in standing.ranked if r.trial is not present]
-        best = min(rivals, key=lambda t: float(t.held_out.sum()), default=None)
-        again = [t for t in rivals if t is best or not self.proposal.gone[:-1]]
+        rivals = [r for r in standing.ranked if r.trial is not present]
+        if self.proposal.gone[:-1]:
+            again = sorted((r.trial for r in rivals), key=lambda t: float(t.held_out.sum()))[:1]
+        else:
+            again = [r.trial for r in rivals if standing.in_reach(r)]
         fits = {id(t): self._settled(t) for t in again}
         found = [fits.get(id(r.trial), r.trial) for r in standing.ranked]
         return [t for t in found if t is not None]

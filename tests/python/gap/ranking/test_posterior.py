@@ -55,6 +55,18 @@ def test_the_better_fit_wins_and_probabilities_sum_to_one_with_none_and_unknown(
     assert len(found.inseparable()) == 1
 
 
+@pytest.mark.parametrize(
+    ("left", "reached"), [(1.2, True), (3.0, True), (11.0, False)], ids=["near", "behind", "far"]
+)
+def test_a_rival_that_leaves_many_times_the_loss_is_out_of_reach(left: float, reached: bool):
+    # 60 blocks count: 5 times the loss are 48 nats, 2.5 times 27.
+    good = a_trial("viscous_friction", 1, np.full(40, 1.1))
+    rival = a_trial("viscous_friction", 1, np.full(40, 0.98 * left), axis=2)
+    found = standing([good, rival])
+    (other,) = found.ranked[1:]
+    assert found.in_reach(other) is reached
+
+
 def test_what_explains_little_is_less_probable_than_something_unknown():
     # Half of what there is to explain, where a cause has to explain six tenths.
     found = standing([a_trial("viscous_friction", 1, np.full(40, 6.0))])

@@ -108,8 +108,9 @@ def first_nine_tenths(fitted: FittedModel) -> np.ndarray:
 def test_a_model_and_a_simulator_settle_where_they_would_without(view, whole, friction, screen):
     again = refitted(view.fitter, lambda *_: None)
     assert again.total == pytest.approx(whole.total, rel=1e-3)
-    direct = settled(view.fitter, [friction], whole)
-    begun = settled(view.fitter, [friction], whole, rough=screen.bench.fitter)
+    worth = 1e-4 * whole.total
+    direct = settled(view.fitter, [friction], whole, worth=worth)
+    begun = settled(view.fitter, [friction], whole, rough=screen.bench.fitter, worth=worth)
     assert begun.renewed and begun.converged
     # A step of either fit has to be worth a share of 1e-4 of the loss, which is its distance from
     # the least, squared, in standard deviations of white noise.

@@ -113,6 +113,21 @@ def test_a_rival_whose_own_sensitivities_diverge_is_none(monkeypatch: pytest.Mon
     assert with_play({BOTH: 900.0, WITH_PLAY: 820.0}) is None
 
 
+@pytest.mark.parametrize(("left", "again"), [(900.0, True), (7000.0, False)])
+def test_a_rival_out_of_reach_is_not_fitted_again(
+    left: float, again: bool, monkeypatch: pytest.MonkeyPatch
+):
+    asked: list[str] = []
+
+    def settled(_fitter: object, free: Sequence[Hypothesis], start: FittedModel):
+        asked.append(free[-1].effect.label)
+        return start
+
+    monkeypatch.setattr(contest, "settled", settled)
+    with_play({BOTH: 820.0, WITH_PLAY: left})
+    assert asked == (["backlash@1"] if again else [])
+
+
 @pytest.mark.parametrize(("leeway", "merged"), [(0.0, False), (0.05, True)])
 def test_laws_of_one_thing_may_leave_what_their_formulas_differ_by(leeway: float, merged: bool):
     """One spring leaves 300 more than two, of 7,000 that they explain: within 5 %, beyond none."""
