@@ -56,7 +56,7 @@ class Proposal:
       effect of the library explains the axis.
     - ``leeway``: share of the explained loss that a replacement may leave more, for its formula error.
     - ``as_entered``: a replacement keeps the probability that it had when the cause was added.
-    - ``never_stays``: the causes give way to a replacement that explains the axis, however likely they are.
+    - ``never_stays``: the causes give way to a replacement that explains the axis, or go out, however likely they are.
     """
 
     axis: int
@@ -98,14 +98,11 @@ def decided(context: Context, proposal: Proposal) -> Decision | None:
     rivals = [t for one in proposal.instead if (t := contest.tried(rest, one)) is not None]
     if proposal.gone[:-1]:
         return contest.one_for(present, rivals)
-    goes = proposal.never_stays and rivals
-    standing = contest.standing(rivals if goes else [present, *rivals])
+    standing = contest.standing(rivals if proposal.never_stays else [present, *rivals])
     if standing is not None and rivals:
         standing = contest.standing(contest.with_second_fits(standing, present))
+    goes = proposal.never_stays or proposal.or_none == "doubtful"
     if goes and (standing is None or _is_none(standing)):
-        # No replacement explains the axis.
-        standing = contest.standing([present])
-    if proposal.or_none == "doubtful" and (standing is None or _is_none(standing)):
         out = settled(fitter, rest, without)
         return None if isinstance(out, Diverged) else Decision(out, None)
     if standing is None or standing.best.trial is present:

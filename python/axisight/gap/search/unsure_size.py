@@ -14,7 +14,7 @@ from axisight.gap.search.rivals import RIVALS
 
 
 def unsure(context: Context) -> Iterator[Proposal]:
-    """Propose the rivals of each cause whose size is not sure; without rivals it stays where it is likelier than none.
+    """Propose the rivals of each cause whose size is not sure; it goes out even if none of them explains the axis.
 
     Such a cause explains the logs by several numbers that make up for one another. A law with fewer numbers, whose size
     is sure, may explain them as well. The least sure comes first: without it, others may become sure.
@@ -33,7 +33,7 @@ def unsure(context: Context) -> Iterator[Proposal]:
             if r.trial.label not in labels and _sureness(r.trial.fitted, -1) > 1
         )[:RIVALS]
         mine = next(f for f in model.free if f.effect.label == cause.trial.label)
-        yield Proposal(standing.axis, (mine,), instead, "doubtful", never_stays=True)
+        yield Proposal(standing.axis, (mine,), instead, never_stays=True)
 
 
 def _sureness(model: FittedModel, place: int) -> float:

@@ -107,19 +107,20 @@ def test_one_that_is_sure_for_any_bodies_goes_out_too_and_the_least_sure_comes_f
     assert second.gone == (barely,)
 
 
-def test_without_rivals_a_cause_that_explains_the_logs_stays(searched):
+def test_without_rivals_a_cause_that_explains_the_logs_goes_out(searched):
     context, state = searched
     (friction, _) = state.model.free
-    proposal = Proposal(0, (friction,), (), "doubtful", never_stays=True)
-    assert decided(context, proposal) is None
+    decision = decided(context, Proposal(0, (friction,), never_stays=True))
+    assert decision is not None and decision.standing is None
+    assert [f.effect.label for f in decision.model.free] == ["torque_ripple@1"]
 
 
-def test_a_rival_that_explains_nothing_does_not_push_it_out(searched):
+def test_a_rival_that_explains_nothing_does_not_take_its_place(searched):
     context, state = searched
     (friction, _) = state.model.free
     rival = Hypothesis(Effect("torque_offset", 1, {"offset_nm": 0.0}), ("offset_nm",))
-    proposal = Proposal(0, (friction,), (Alternative(rival),), "doubtful", never_stays=True)
-    assert decided(context, proposal) is None
+    decision = decided(context, Proposal(0, (friction,), (Alternative(rival),), never_stays=True))
+    assert decision is not None and decision.standing is None
 
 
 def of_trial(label: str):
