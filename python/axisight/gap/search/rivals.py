@@ -18,8 +18,9 @@ NEARLY = 0.8
 
 
 def exchanged(context: Context) -> Iterator[Proposal]:
-    """Propose rivals for each cause that was judged beside another set, or with a bent simulator."""
+    """Propose rivals for each cause that was judged beside another set, with a bent simulator, or that leaves much."""
     state = context.state
+    left, floor = state.left(), state.layout.by_axis(state.floor)
     final = {f.effect.label for f in state.model.free}
     crooked = bent(context.fitter, state.model) > 0
     for cause, standing in state.accepted:
@@ -30,10 +31,13 @@ def exchanged(context: Context) -> Iterator[Proposal]:
             rivals = mends
         elif beside < final or crooked:
             rivals = open_rivals(cause, state.standings_of(cause))
+        elif left[standing.axis] > floor[standing.axis]:
+            # The fit of a better law may have ended early.
+            rivals = _nearly_as_good(cause, standing)
         else:
             continue
         seen = [*standing.ranked, *(r for s in context.last for r in s.ranked)]
-        rivals = with_plainer_laws(cause, rivals, seen)
+        rivals = with_simpler_laws(cause, rivals, seen)
         alone = len(state.model.free) == 1
         instead = tuple(
             Alternative(r.trial.fitted.free[-1], r.trial.fitted if alone else state.model)
@@ -66,28 +70,35 @@ def open_rivals(
     return [r for r in stood if r is likeliest[r.trial.label] and r.trial.label != label]
 
 
-def with_plainer_laws(
+def with_simpler_laws(
     cause: RankedHypothesis, rivals: Sequence[RankedHypothesis], seen: Sequence[RankedHypothesis]
 ) -> list[RankedHypothesis]:
-    """Return rivals of a cause, each before it the plainer law that it or the cause adds to, if ``seen`` has that.
+    """Return rivals of a cause; before it and each of them the simpler laws that it is like, if ``seen`` has them.
 
-    A richer law is never judged without its plainer one.
+    A richer law is never judged without the plainer one, a composite without its first part, nor a current loop without
+    the delay that it resembles.
     """
     out: list[RankedHypothesis] = []
     for rich in (cause, *rivals):
         effect = rich.trial.hypothesis.effect
-        plainer = effect_info(effect.name).plainer
-        plain = None if plainer is None else (plainer.law, effect.axis)
-        same = (
-            r
-            for r in seen
-            if (r.trial.hypothesis.effect.name, r.trial.hypothesis.effect.axis) == plain
-        )
-        found = next(same, None)
-        out += [found] if found is not None else []
+        simpler = [(name, effect.axis) for name in _simpler(effect.name)]
+        found = {
+            law: r
+            for r in reversed(seen)
+            for law in simpler
+            if (r.trial.hypothesis.effect.name, r.trial.hypothesis.effect.axis) == law
+        }
+        out += [found[law] for law in simpler if law in found]
         out += [rich] if rich is not cause else []
     first = {r.trial.label: r for r in reversed(out)}
     return [r for r in out if r is first[r.trial.label]]
+
+
+def _simpler(effect: str) -> list[str]:
+    """Return the law that an effect adds to, the first part of a composite, and the effect that it resembles."""
+    info = effect_info(effect)
+    relations = (info.plainer, info.resembles)
+    return [*(x.law for x in relations if x is not None), *info.parts[:1]]
 
 
 def mending(cause: RankedHypothesis, standings: Sequence[AxisPosterior]) -> list[RankedHypothesis]:

@@ -63,25 +63,34 @@ def test_rivals_that_stood_beside_a_cause_are_the_likeliest_on_any_axis_that_it_
     assert [r.trial.label for r in found] == ["backlash@1", "nonlinear_stiffness@3"]
 
 
+def leaving(above: float) -> dict[str, object]:
+    """Parts of a state whose model leaves so much above noise of one on its only axis."""
+    layout = SimpleNamespace(by_axis=np.asarray)
+    return {"left": lambda: np.array([above]), "floor": np.array([1.0]), "layout": layout}
+
+
 @pytest.mark.parametrize(
-    ("beside", "final", "crooked", "tried"),
+    ("beside", "final", "crooked", "left", "tried"),
     [
         # Judged beside what is in the model still, and nothing else came in.
-        ((), (SOFT,), False, []),
+        ((), (SOFT,), False, 0.9, []),
         # The simulator is bent now.
-        ((), (SOFT,), True, ["backlash@1"]),
+        ((), (SOFT,), True, 0.9, ["backlash@1"]),
+        # It leaves as much again as noise does: those that explained nearly as much, likely or not.
+        ((), (SOFT,), False, 1.1, ["backlash@1", "torque_offset@1"]),
         # Another cause came in since.
-        ((), (SOFT, CUBIC), False, ["backlash@1"]),
-        # What it was judged beside went out: those that explained nearly as much, likely or not.
-        ((CUBIC,), (SOFT,), False, ["backlash@1", "torque_offset@1"]),
+        ((), (SOFT, CUBIC), False, 0.9, ["backlash@1"]),
+        # What it was judged beside went out: again those that explained nearly as much.
+        ((CUBIC,), (SOFT,), False, 0.9, ["backlash@1", "torque_offset@1"]),
         # A rival that is in the model itself is none.
-        ((), (SOFT, PLAY), False, []),
+        ((), (SOFT, PLAY), False, 0.9, []),
     ],
 )
 def test_a_cause_is_judged_anew_where_it_stands_otherwise_now(
     beside: tuple[Hypothesis, ...],
     final: tuple[Hypothesis, ...],
     crooked: bool,
+    left: float,
     tried: list[str],
     monkeypatch: pytest.MonkeyPatch,
 ):
@@ -104,6 +113,7 @@ def test_a_cause_is_judged_anew_where_it_stands_otherwise_now(
         model=SimpleNamespace(free=final),
         accepted=[(standing.best, standing)],
         standings_of=lambda _: (standing,),
+        **leaving(left),
     )
     monkeypatch.setattr(rivals, "bent", lambda *_: float(crooked))
     proposals = list(exchanged(SimpleNamespace(fitter=None, state=state, last=())))
@@ -123,6 +133,7 @@ def test_a_law_that_mends_is_proposed_whatever_rounds_moves_have_added(
         accepted=[(standing.best, standing)],
         rounds=[SimpleNamespace(standings=(standing,))],
         standings_of=lambda _: (standing,),
+        **leaving(0.5),
     )
     monkeypatch.setattr(rivals, "bent", lambda *_: 0.0)
     (found,) = exchanged(SimpleNamespace(fitter=None, state=state, last=(waves,)))
