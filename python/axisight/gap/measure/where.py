@@ -246,7 +246,8 @@ def findings(
     total = held.sum()
     out = []
     for i in range(len(held)):
-        share = float(held[i].sum() / total) if total > 0 else 0.0
+        # Sums in another order may exceed the whole by rounding.
+        share = min(float(held[i].sum() / total), 1.0) if total > 0 else 0.0
         if share >= _SMALLEST_SHARE:
             out.append(placed(bands, regimes, i, share, significance, of))
     return tuple(sorted(out, key=lambda w: -w.share))

@@ -18,20 +18,18 @@ from axisight.gap.fit.settling import RENEWALS
 from axisight.gap.ranking.fitted_hypothesis import FittedHypothesis
 from axisight.gap.ranking.posterior import AxisPosterior
 
-# Score by which a lag may trail the leader and still overtake it after a full fit.
-_NEAR = 0.03
 # Most steps of a full fit, and the fall of the loss below which it ends.
 _STEPS = 12
 _WORTH = 1.0
 
 
 def lags_beside(standing: AxisPosterior) -> list[FittedHypothesis]:
-    """Return the delays and lags close to the leader of an axis; none unless a delay or lag of the axis leads."""
+    """Return the delays and lags in reach of the leader of an axis; none unless a delay or lag of the axis leads."""
     if not _is_of(standing.axis, standing.best.trial):
         return []
-    least = standing.best.score - _NEAR
-    near = (r for r in standing.ranked if r.score > least and standing.in_reach(r))
-    return [r.trial for r in near if _is_of(standing.axis, r.trial)]
+    return [
+        r.trial for r in standing.ranked if _is_of(standing.axis, r.trial) and standing.in_reach(r)
+    ]
 
 
 def _is_of(axis: int, one: FittedHypothesis) -> bool:

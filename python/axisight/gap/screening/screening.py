@@ -30,9 +30,8 @@ A = TypeVar("A")
 _TOGETHER = 4
 # Largest number of evaluations between two start values of an effect.
 _SCANS = 10
-# Difference of two losses, as a share, that is next to nothing.
-_SAME = 1e-4
-# Share of the loss that the first start must promise if it has an effect: each further start then costs a simulation.
+# Share of the loss that the first start must promise if it has an effect, and that the loss must differ by between the
+# smallest and the largest start: each further start costs a simulation.
 _LEAST_GAIN = 0.002
 # The logs of the last screening stay in use if they hold this share of the error that the same number of logs can hold.
 _NEARLY = 0.8
@@ -276,8 +275,8 @@ class Screening:
     ) -> Start:
         """Return the best start of a candidate with one free parameter, searched at ``begin`` and between.
 
-        If the smallest and the largest value have the same loss, the effect does not act: a gear that is always loaded
-        shows no play, however wide.
+        If the smallest and the largest value have nearly the same loss, the effect hardly acts: a gear that is always
+        loaded shows no play, however wide.
         """
         name = option.free[0]
 
@@ -287,7 +286,7 @@ class Screening:
 
         values = sorted(begin)
         first, last = loss(values[0]), loss(values[-1])
-        if abs(last - first) <= _SAME * abs(first) < np.inf:
+        if abs(last - first) <= _LEAST_GAIN * first < np.inf:
             return Start(option.at({name: values[0]}), robot_values, self.model.total - first)
         losses = [first, *map(loss, values[1:-1]), last][: len(values)]
         at = int(np.argmin(losses))

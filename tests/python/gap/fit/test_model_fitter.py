@@ -308,7 +308,7 @@ def play(starts: Sequence[float] = tuple(STARTS)) -> Hypothesis:
 
 def narrow(width: float, true: float) -> float:
     """Return a loss with a narrow valley. Outside, it rises a little: a wider gap never moves in the same way."""
-    return float(2 * (1 + width) * (1 - np.exp(-((width / true - 1) ** 2) / 0.06)))
+    return float(2 * (1 + 10 * width) * (1 - np.exp(-((width / true - 1) ** 2) / 0.06)))
 
 
 @pytest.mark.parametrize("true", [1.1e-5, 7e-5, 1.7e-4, 9.3e-4])
@@ -326,10 +326,10 @@ def test_the_bottom_of_a_valley_narrower_than_the_steps_between_starts_is_found(
 
 def test_where_no_start_is_better_none_is_looked_at_closer():
     model = fitted()
-    fitter = Valley(lambda v: model.total * (1 + v))
+    fitter = Valley(lambda v: model.total * (1 + 10 * v))
     start = screen(model, fitter).best_of_starts(play())
     assert (start.option.effect.parameters or {})["half_width_rad"] == STARTS[0]
-    assert start.gain == pytest.approx(-model.total * STARTS[0])
+    assert start.gain == pytest.approx(-10 * model.total * STARTS[0])
     # With the simulator as given, and as it was re-fitted.
     assert sorted(fitter.asked) == sorted([*STARTS, *STARTS])
 
