@@ -20,13 +20,13 @@ from axisight.robot import Robot
 # Natural size, as a share of the torque, inertia or mass of an axis, like the production scatter of parameters.
 # With 25 %, a small torque in quiet logs of slow motions is 1000 times the noise, and would count as chaos.
 _SHARE = 0.02
-# Samples between the two angles of a speed; over that many, noise of the angles does not matter.
+# Samples between the angles of a speed or an acceleration; over that many, noise of the angles does not matter.
 _APART = 20
 
 
 @dataclass(frozen=True)
 class AxisSizes:
-    """Reference sizes of an axis: torque [Nm] and speed [rad/s] of its motor in the logs, and values of its robot.
+    """Reference sizes of an axis: motion and torque [Nm] of its motor in the logs, and values of its robot.
 
     ``ratio``: joint angle per motor angle; ``stiffness`` [Nm/rad, joint side], None for a rigid gear;
     ``motor_inertia`` [kg m^2]; ``last_kg``: mass of the last link [kg]; ``travel_rad``: range of the joint angle.
@@ -34,6 +34,7 @@ class AxisSizes:
 
     torque_nm: float
     speed_rad_s: float
+    acceleration_rad_s2: float
     ratio: float
     stiffness: float | None
     motor_inertia: float
@@ -60,6 +61,7 @@ _BY_UNIT: Mapping[str, Callable[[AxisSizes], float]] = {
     "Nm s^2/rad^2": lambda a: a.torque_nm / a.speed_rad_s**2,
     "Nm (joint side)": lambda a: a.torque_nm / a.ratio,
     "Nm s^2/rad": lambda a: a.motor_inertia,
+    "kg m^2": lambda a: a.torque_nm / a.acceleration_rad_s2,
     "Nm/rad^3": lambda a: a.torque_nm / a.ratio / max(a.deflection_rad, 1e-100) ** 3,
     "Nm/rad (joint side)": lambda a: a.torque_nm / a.ratio,
     "kg m^2 (joint side)": lambda a: a.motor_inertia / a.ratio**2,
@@ -121,6 +123,7 @@ class NaturalSizes:
         return AxisSizes(
             torque_nm=max(float(np.abs(log.torque_nm[:, place]).max()) for log in self.logs),
             speed_rad_s=max(_top_speed(log, place) for log in self.logs),
+            acceleration_rad_s2=max(_top_acceleration(log, place) for log in self.logs),
             ratio=ratio,
             stiffness=None if joint.spring is None else joint.spring.stiffness,
             motor_inertia=np.inf if joint.drive is None else joint.drive.motor_inertia,
@@ -139,3 +142,13 @@ def _top_speed(log: Log, place: int) -> float:
     apart = min(_APART, len(angle) - 1)
     moved = np.abs(angle[apart:] - angle[:-apart]).max()
     return max(float(moved) / (apart * log.sample_time_s), 1e-9)
+
+
+def _top_acceleration(log: Log, place: int) -> float:
+    """Return the top acceleration of a motor [rad/s^2], never zero."""
+    angle = log.position_rad[:, place]
+    apart = min(_APART, (len(angle) - 1) // 2)
+    if apart < 1:
+        return 1e-9
+    bent = np.abs(angle[2 * apart :] - 2 * angle[apart:-apart] + angle[: -2 * apart]).max()
+    return max(float(bent) / (apart * log.sample_time_s) ** 2, 1e-9)
