@@ -258,12 +258,17 @@ def _soft(trial: StartContext) -> Hypothesis:
     return replace(_of_a_gear(trial), effect=begin, bounds=bounds, starts=further)
 
 
-def _coupled(trial: StartContext) -> Hypothesis | None:
-    """Start without coupling from one axis to the next, its friction not free; None if the next gear is rigid."""
+def _coupled(trial: StartContext) -> Hypothesis:
+    """Start without coupling from one axis to the next; with rigid gears, both may share friction, in either sense.
+
+    An elastic gear shows the turn that it gets. Its friction is not free: each axis has some of its own.
+    """
     assert isinstance(trial.place, tuple)  # guaranteed by the scope of the effect
-    if trial.robot.axis_is_rigid[trial.place[1] - 1]:
-        return None
-    return Hypothesis(_neutral(trial).effect, ("share",))
+    begin = _neutral(trial).effect
+    if not trial.robot.axis_is_rigid[trial.place[1] - 1]:
+        return Hypothesis(begin, ("share",))
+    shared = ("viscous_nm_s_rad", "coulomb_nm", "speed_ratio")
+    return Hypothesis(begin, shared, starts=({"speed_ratio": -1.0},))
 
 
 def _axis_share(at: StartData, index: int) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from jsonschema import validate
 
-from axisight import Effect, diagnose, load_robot, simulate
+from axisight import Effect, Robot, diagnose, load_robot, simulate
 from axisight.effects import effect_info
 from axisight.gap import verdict_schema
 from axisight.gap.facts.result import Candidate, Cause, DetectionLimit, Interval
@@ -28,6 +28,53 @@ def test_neighbours_are_tried():
     robot = load_robot("irb6600_like")
     assert _places(robot, effect_info("axis_coupling")) == [(1, 2), (2, 3)]
     assert _places(load_robot("two_mass_axis"), effect_info("axis_coupling")) == []
+
+
+# Two rigid axes of a wrist whose motors share a drag: it acts on the difference of their speeds.
+WRIST = """
+schema = "axisight.robot/2"
+name = "a rigid wrist"
+gravity = [0.0, 0.0, -9.81]
+sample_time = 0.002
+[[joint]]
+name = "bend"
+kind = "driven"
+origin = [0.0, 0.0, 0.1]
+axis = [0.0, 1.0, 0.0]
+link = { mass = 2.0, com = [0.08, 0.01, 0.0], inertia = [3e-3, 1e-2, 1e-2, 0.0, 0.0, 0.0] }
+drive = { gear_ratio = 0.02, motor_inertia = 3e-5, viscous_friction = 1e-4 }
+[[joint]]
+name = "roll"
+kind = "driven"
+origin = [0.12, 0.0, 0.0]
+axis = [1.0, 0.0, 0.0]
+link = { mass = 0.8, com = [0.03, 0.0, 0.02], inertia = [1e-3, 2e-3, 2e-3, 0.0, 0.0, 0.0] }
+drive = { gear_ratio = 0.025, motor_inertia = 2e-5, viscous_friction = 1e-4 }
+[controller]
+kind = "pi_velocity"
+kp = [5e-3, 3e-3]
+ki = [5e-2, 3e-2]
+[sensor]
+position_noise_std = 2e-5
+"""
+DRAG = {"viscous_nm_s_rad": 2e-4, "coulomb_nm": 0.01, "speed_ratio": -1.0, "smoothing_rad_s": 0.3}
+
+
+def test_friction_that_two_rigid_axes_share_is_named():
+    robot = Robot.from_toml(WRIST)
+    effect = Effect("axis_coupling", None, DRAG, (1, 2))
+    n = int(5.0 / robot.sample_time_s)
+    logs = [
+        log_of(robot, [effect], 3.0 * motion(seed, n, robot.sample_time_s)[:, :2], seed)
+        for seed in range(3)
+    ]
+    found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:])
+    (cause,) = found.causes
+    assert found.verdict == "explained"
+    assert (cause.effect, cause.axes) == ("axis_coupling", (1, 2)) and cause.probability > 0.9
+    for name in ("viscous_nm_s_rad", "coulomb_nm", "speed_ratio"):
+        interval = cause.parameters[name]
+        assert interval.low <= DRAG[name] <= interval.high, name
 
 
 def test_places_are_words():
