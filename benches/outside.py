@@ -14,7 +14,7 @@ beside the effect, too. Parameters count where they have the names of `axisight 
 
 Every case is diagnosed by one process of the command `axisight diagnose`, without its truth. Verdicts
 that are there already stay, so that a run may be broken off. `axisight blind score` counts by the rules
-of docs/blind.md. benches/outside/ makes such cases with four engines.
+of docs/blind.md. benches/outside/ makes such cases with five engines.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -280,6 +280,7 @@ class Screening:
         """
         name = option.free[0]
 
+        @cache
         def loss(value: float) -> float:
             found = self.bench.attempt(self.fitter.loss, option.at({name: value}), robot_values)
             return np.inf if found is None else found
@@ -288,7 +289,7 @@ class Screening:
         first, last = loss(values[0]), loss(values[-1])
         if abs(last - first) <= _LEAST_GAIN * first < np.inf:
             return Start(option.at({name: values[0]}), robot_values, self.model.total - first)
-        losses = [first, *map(loss, values[1:-1]), last][: len(values)]
+        losses = [loss(v) for v in values]
         at = int(np.argmin(losses))
         least, value = losses[at], values[at]
         if least < self.model.total:

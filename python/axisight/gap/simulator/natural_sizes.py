@@ -148,7 +148,5 @@ def _top_acceleration(log: Log, place: int) -> float:
     """Return the top acceleration of a motor [rad/s^2], never zero."""
     angle = log.position_rad[:, place]
     apart = min(_APART, (len(angle) - 1) // 2)
-    if apart < 1:
-        return 1e-9
     bent = np.abs(angle[2 * apart :] - 2 * angle[apart:-apart] + angle[: -2 * apart]).max()
     return max(float(bent) / (apart * log.sample_time_s) ** 2, 1e-9)

@@ -92,17 +92,14 @@ def test_only_the_one_that_noise_makes_goes_out(searched, entered):
 
 
 def test_one_that_is_sure_for_any_bodies_goes_out_too_and_the_least_sure_comes_first(
-    searched, entered
+    searched, entered, monkeypatch
 ):
     context, state = searched
     friction, wave = state.model.free
     # The regression told no more than that there is some friction.
     barely = replace(friction, sure={"coulomb_nm": (1e-3, 0.81)})
-    entered.model = replace(state.model, free=(barely, wave))
-    try:
-        first, second = unsure(context)
-    finally:
-        entered.model = replace(entered.model, free=(friction, wave))
+    monkeypatch.setattr(entered, "model", replace(state.model, free=(barely, wave)))
+    first, second = unsure(context)
     assert first.labels == {"torque_ripple@1"}
     assert second.gone == (barely,)
 
