@@ -24,8 +24,11 @@ from .display.bars import (
 from .effects import (
     Effect,
     EffectInfo,
+    Harmonic,
     effect_info,
     effect_table,
+    resolver_ripple,
+    torque_ripple,
 )
 from .errors import (
     AxisightError,
