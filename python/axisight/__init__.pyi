@@ -10,6 +10,7 @@ from . import (
     identifiability,
     montecarlo,
     mujoco,
+    paths,
     records,
     rigid_body,
     robot_export,

@@ -51,6 +51,11 @@ _COMMANDS = {
         "Identify",
         "Make references for a robot, check them against its limits in simulation, and write them.",
     ),
+    "plan": (
+        "plan:plan_command",
+        "Simulate",
+        "Plan the fastest motion along a path within limits, and write its velocity references.",
+    ),
     "simulate": (
         "simulate:simulate_command",
         "Simulate",
