@@ -9,6 +9,7 @@ from axisight.rigid_body.consistent import (
     pseudo_inertia,
 )
 from axisight.rigid_body.coupling import MotorCoupling, gear_coupling
+from axisight.rigid_body.drifting import track_parameters
 from axisight.rigid_body.energy import (
     EnergyEstimate,
     EnergyRegression,
@@ -59,4 +60,5 @@ __all__ = [
     "prior_spread",
     "pseudo_inertia",
     "torque_regressor",
+    "track_parameters",
 ]

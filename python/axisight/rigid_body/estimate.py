@@ -121,7 +121,7 @@ def identify_rigid_body(
         raise InputError(f"torque_nm: expected {len(motion[0])} rows as q, got {len(torque)}")
     if not torque.any():
         raise InputError("torque_nm: expected measured torques, got zeros only")
-    factors = _factors(
+    factors = regression_factors(
         base, motion, torque, known, weight, default_blocks(blocks, len(torque)), threads
     )
 
@@ -258,7 +258,7 @@ def known_base(
     return base
 
 
-def _factors(
+def regression_factors(
     base: BaseParameters,
     motion: tuple[Array, Array, Array],
     torque: Array,
@@ -267,6 +267,7 @@ def _factors(
     blocks: int,
     threads: int,
 ) -> Factors:
+    """Return the triangular factors of a motion and its torques, in blocks of consecutive samples."""
     model = base.model
     order = np.argsort(base.columns)
     held = [float(known.get(name, 0.0)) for name in model.names]
