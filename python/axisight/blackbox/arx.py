@@ -266,14 +266,16 @@ def triangularized(
     n_rows = 0
     for e in data:
         n = e.n_samples - most
+        signals = {"y": -e.output.T, "u": e.input.T}
         for start in range(0, max(n, 0), CHUNK):
-            rows = np.arange(start, min(start + CHUNK, n)) + most
-            block = np.empty((len(rows), width))
+            stop = min(start + CHUNK, n)
+            block = np.empty((len(r) + stop - start, width), order="F")
+            block[: len(r)] = r
             for k, (kind, channel, lag) in enumerate(labels):
-                source = -e.output if kind == "y" else e.input
-                block[:, k] = source[rows - lag, channel]
-            block[:, len(labels) :] = e.output[rows]
-            (r,) = linalg.qr(np.vstack([r, block]), mode="r", check_finite=False)
+                at = most - lag
+                block[len(r) :, k] = signals[kind][channel, start + at : stop + at]
+            block[len(r) :, len(labels) :] = e.output[start + most : stop + most]
+            (r,) = linalg.qr(block, mode="r", overwrite_a=True, check_finite=False)
             r = r[:width]
         n_rows += max(n, 0)
     widest = int(max((na.sum(axis=1) + nb.sum(axis=1)).max(), 1))
