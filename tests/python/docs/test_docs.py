@@ -28,6 +28,7 @@ MODULES = (
     axisight.identifiability,
     axisight.montecarlo,
     axisight.mujoco,
+    axisight.paths,
     axisight.records,
     axisight.rigid_body,
     axisight.robot_file,
