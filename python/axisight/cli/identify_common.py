@@ -136,7 +136,7 @@ def options(ctx: typer.Context) -> dict[str, Any]:
     for name, value in ctx.params.items():
         if isinstance(value, list | tuple):
             out[name] = [v.name if isinstance(v, Path) else v for v in value]
-        elif name not in ("robot", "out", "force"):
+        elif name not in ("robot", "out", "plot", "force"):
             out[name] = value.name if isinstance(value, Path) else value
     return out
 
@@ -180,15 +180,20 @@ def option_words(text: str, options: Collection[str]) -> str:
 
 
 def provenance(
-    method: str, files: Sequence[Path], settings: Mapping[str, Any], columns: Path | None = None
+    method: str,
+    files: Sequence[Path],
+    settings: Mapping[str, Any],
+    columns: Path | None = None,
+    *,
+    command: str = "axisight identify",
 ) -> Provenance:
-    """Return the provenance of identified values: hashes of logs and column map, and the given options."""
+    """Return the provenance of what a command finds: hashes of logs and column map, and the given options."""
     files = [part for path in files for part in files_of(path)]
     files += [] if columns is None else [column_file(columns)]
     count = Counter(path.name for path in files)
     names = [path.name if count[path.name] == 1 else str(path) for path in files]
     return Provenance(
-        f"axisight identify {method}",
+        f"{command} {method}",
         {name: hash_file(path) for name, path in zip(names, files, strict=True)},
         {name: value for name, value in settings.items() if value is not None},
     )

@@ -31,6 +31,7 @@ from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.frf.interop import load_netcdf
+from axisight.responses.operating_point import OPERATING_POINT
 from axisight.robot import Robot
 
 if TYPE_CHECKING:
@@ -40,8 +41,6 @@ if TYPE_CHECKING:
 
 _USUAL = ("*.stiffness", "*.damping")
 _CONVERGED = ("loss_converged", "step_converged", "exact")
-POSE = "joint_angle_rad"
-"""Attribute of a response that holds its operating point."""
 
 
 def elastic_command(
@@ -49,7 +48,7 @@ def elastic_command(
     robot: Annotated[str, typer.Argument(help="robot.toml or a preset: where the search starts.")],
     responses: Annotated[
         list[Path],
-        typer.Argument(help="Frequency responses, one per operating point (NetCDF, save_netcdf)."),
+        typer.Argument(help="Frequency responses, one per operating point (NetCDF, of 'axisight frf')."),
     ],
     parameters: Annotated[
         list[str] | None,
@@ -63,7 +62,7 @@ def elastic_command(
         typer.Option(
             metavar="ANGLE,...",
             help="Operating point of each response in turn: angles of the driven joints (rad). "
-            f"Default: the attribute {POSE} of the files.",
+            f"Default: the attribute {OPERATING_POINT} of the files.",
         ),
     ] = None,
     out: Out = None,
@@ -155,12 +154,12 @@ def _responses(
     out = []
     for i, path in enumerate(paths):
         response = load_netcdf(path)
-        if not poses and POSE not in response.attrs:
+        if not poses and OPERATING_POINT not in response.attrs:
             raise InputError(
                 f"{path}: operating point: expected --at ANGLE,... once for each response, or the attribute "
-                f"{POSE} of the file, got neither"
+                f"{OPERATING_POINT} of the file, got neither"
             )
-        pose = poses[i] if poses else np.atleast_1d(response.attrs[POSE]).tolist()
+        pose = poses[i] if poses else np.atleast_1d(response.attrs[OPERATING_POINT]).tolist()
         if len(pose) != robot.n_axes:
             raise InputError(
                 f"{path}: operating point: expected {robot.n_axes} angles of driven joints, got "

@@ -1,0 +1,61 @@
+"""Print a response from logs: choices, findings, quality by band, advice."""
+
+from __future__ import annotations
+
+import math
+
+from rich.table import Table
+
+from axisight.cli.common import say
+from axisight.cli.screen import OUT
+from axisight.records import FindingKind
+from axisight.responses import OPERATING_POINT, LogResponse
+
+# Findings that the lines about period, lines and periods already state.
+_STATED = (FindingKind.PERIOD, FindingKind.LINES)
+
+
+def show(found: LogResponse) -> None:
+    """Print what was chosen, what was seen, noise and distortion by band, and what to do next."""
+    for text in found.choices:
+        say(text)
+    say(_operating_point(found))
+    for finding in found.findings:
+        if finding.serious:
+            say(f"warning: {finding}")
+        elif finding.kind not in _STATED:
+            say(str(finding))
+    OUT.print(_table(found))
+    for text in found.account.sentences:
+        say(text)
+
+
+def _operating_point(found: LogResponse) -> str:
+    angles = found.response.attrs.get(OPERATING_POINT)
+    if angles is None:
+        return (
+            "operating point: unknown, as the logs have motor positions only; --robot ROBOT (its gear ratios) "
+            "or --at ANGLE,... states it for 'identify elastic'"
+        )
+    return f"operating point: {', '.join(f'{angle:.4f}' for angle in angles)} rad"
+
+
+def _table(found: LogResponse) -> Table:
+    table = Table()
+    titles = ("band [Hz]", "lines", "noise", "distortion", "off-diagonal", "coherence", "weak", "lost")
+    for title in titles:
+        table.add_column(title, justify="left" if title == titles[0] else "right")
+    for row in found.account.bands.to_dict("records"):
+        table.add_row(
+            f"{row['low_hz']:.3g} .. {row['high_hz']:.3g}",
+            f"{row['lines']:.0f}",
+            *(_percent(row[name]) for name in ("noise", "distortion", "off_diagonal")),
+            "-" if math.isnan(row["coherence"]) else f"{row['coherence']:.4f}",
+            f"{row['weak']:.0f}",
+            f"{row['lost']:.0f}",
+        )
+    return table
+
+
+def _percent(share: float) -> str:
+    return "-" if math.isnan(share) else f"{100 * share:.2g} %"
