@@ -66,17 +66,19 @@ def read_logs(
     *,
     unchecked: bool,
     used: Used = WHOLE,
+    broadband: bool = False,
 ) -> list[Log]:
     """Return the ``used`` part of logs that pass ``axisight check``; print its warnings.
 
     The check is needed because identification also fits data in wrong units or with missing rows. Raises
     InputError for errors of the check and faults that :func:`check_fit_inputs` refuses, unless ``unchecked``.
+    ``broadband``: references exceed the bandwidth of the loop, so no warning says that motors do not follow.
     Raises InputError for a revolute axis where the robot has a prismatic one, and the reverse.
     """
     logs = []
     said: set[tuple[str, str]] = set()
     for path in paths:
-        said |= _checked(path, columns, unchecked=unchecked)
+        said |= _checked(path, columns, unchecked=unchecked, broadband=broadband)
         log = read_log(path, columns, robot=robot)
         slides = [kind == "prismatic" for kind in log.axis_kinds]
         if robot is not None and slides != list(robot.axis_is_prismatic):
@@ -94,7 +96,9 @@ def read_logs(
     return logs
 
 
-def _checked(path: Path, columns: Path | None, *, unchecked: bool) -> set[tuple[str, str]]:
+def _checked(
+    path: Path, columns: Path | None, *, unchecked: bool, broadband: bool
+) -> set[tuple[str, str]]:
     """Print the warnings of ``axisight check`` and return them as (name of the log, message).
 
     Raises InputError for errors without a stable name, unless ``unchecked``. Errors with a name are refused
@@ -102,6 +106,12 @@ def _checked(path: Path, columns: Path | None, *, unchecked: bool) -> set[tuple[
     """
     said = set()
     for finding in check_log(path, columns).findings:
+        if (
+            broadband
+            and finding.column.startswith("velocity_ref")
+            and finding.severity == "warning"
+        ):
+            continue
         text = f"{path.name}: {finding.column}: {finding.message}"
         if finding.severity == "error" and not finding.name and not unchecked:
             raise InputError(f"{text} (correct it in a column map, or go on with --unchecked)")

@@ -83,13 +83,17 @@ class _Quality:
         noise = response["noise_variance"].values if "noise_variance" in response else unknown
         distortion = np.maximum(variance - noise, 0.0) if setting.distortion_seen else unknown
         with np.errstate(invalid="ignore", divide="ignore"):
-            relative = [np.sqrt(part) / size for part in (noise, distortion, variance)]
+            noise, distortion, total = (
+                np.asarray(np.sqrt(part) / size) for part in (noise, distortion, variance)
+            )
         radius = confidence_radius(response).values
         lost = np.isin(response["flag"].values, (Flag.RANK_DEFICIENT, Flag.NO_EXCITATION))
         return cls(
             response["frequency_hz"].values,
             tuple(int(a) for a in response["input"].values),
-            *relative,
+            noise,
+            distortion,
+            total,
             np.asarray(radius >= size),
             lost,
             _coherence(response, records),
@@ -186,7 +190,7 @@ class _Quality:
         worst = int(np.argmin(median))
         low = self.coherence[:, worst] < _LOW_COHERENCE
         text = (
-            f"coherence: median {median[worst]:.4g} on the worst output, axis {self.axes[worst]}; below "
+            f"coherence: median {median[worst]:.4f} on the worst output, axis {self.axes[worst]}; below "
             f"{_LOW_COHERENCE:g} at {counted(int(low.sum()), 'line')}"
         )
         return [text]

@@ -17,7 +17,9 @@ _SAME = 1e-3
 # A stretch whose reference is below this share of the strongest is a rest, which repeats as well.
 _RESTS = 0.01
 # Parts of a log in which the period is looked for, as several experiments in a row repeat only apart.
-_PARTS = (1, 2, 3, 4, 6, 8)
+_PARTS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
+# Share of the motion that must repeat with the period of a log.
+_MOSTLY = 0.6
 
 
 @dataclass(frozen=True)
@@ -50,18 +52,39 @@ def common_period(experiments: Sequence[Experiment]) -> int | None:
 
 
 def _period(run: Experiment) -> int | None:
-    signal = run.input if run.reference is None else run.reference
-    for parts in _PARTS if run.reference is not None else (1,):
-        length = len(signal) // parts
+    """Return the period of a log, which may hold several experiments in a row.
+
+    A period found in a part of the log counts if the reference repeats with it over most of its motion.
+    """
+    if run.reference is None:
+        return _found(run.input)
+    for parts in _PARTS:
+        length = len(run.reference) // parts
         for k in range(parts):
-            part = signal[k * length : (k + 1) * length]
-            if not np.ptp(part, axis=0).any():
-                continue
             try:
-                return find_period(part).n_samples
-            except NotPeriodicError:
-                continue
-    return None
+                found = _found(run.reference[k * length : (k + 1) * length])
+            except InputError:
+                continue  # the whole reference has the message
+            if found is not None and _explains(run.reference, found):
+                return found
+    return _found(run.reference)
+
+
+def _found(signal: Real) -> int | None:
+    """Return the period of a signal, None if it does not move or repeat; raise as `find_period` else."""
+    if not np.ptp(signal, axis=0).any():
+        return None
+    try:
+        return find_period(signal).n_samples
+    except NotPeriodicError:
+        return None
+
+
+def _explains(reference: Real, n_samples: int) -> bool:
+    """Whether a reference repeats with a period wherever it moves, but for changes of experiment."""
+    covered = sum(stop - start for start, stop in _repeating(reference, n_samples))
+    still = np.abs(reference).max(axis=1) <= _SAME * np.abs(reference).max()
+    return covered > _MOSTLY * np.count_nonzero(~still)
 
 
 def cut_at_changes(runs: Sequence[Experiment], n_samples: int) -> list[Cut]:
@@ -117,5 +140,7 @@ def said_cuts(cuts: Sequence[Cut], runs: Sequence[Experiment]) -> list[str]:
     most = max(left)
     if most > 0:
         step = runs[left.index(most)].sample_time_s
-        out.append(f"left out where the reference does not repeat: up to {most * step:.3g} s of a log")
+        out.append(
+            f"left out where the reference does not repeat: up to {most * step:.3g} s of a log"
+        )
     return out

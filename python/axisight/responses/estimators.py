@@ -115,7 +115,7 @@ def _free_enough(records: PeriodicRecords) -> bool:
     if not free.size:
         free = np.setdiff1d(np.arange(records.lines[0], records.lines[-1]), records.lines)
     counts = [np.sum(free % 2 == parity) for parity in set((records.lines % 2).tolist())]
-    return min(counts) >= _LEAST_FREE
+    return bool(min(counts) >= _LEAST_FREE)
 
 
 def chosen_of_arbitrary(estimator: str, mean: str | None) -> Choice:
@@ -142,7 +142,8 @@ def estimate_periodic(
     Raises InputError as the estimators do, and for fewer experiments than inputs whose lines do not tell the
     inputs apart.
     """
-    name, options = choice.estimator, {"quantity": quantity}
+    name = choice.estimator
+    options: dict[str, Any] = {"quantity": quantity}
     if choice.mean != "none":
         return _MEANS[choice.mean](records, **options)
     if name == "fast":

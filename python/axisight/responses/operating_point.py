@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from axisight.arguments import Real
 from axisight.errors import InputError
@@ -13,6 +14,10 @@ from axisight.robot import Robot
 
 OPERATING_POINT = "joint_angle_rad"
 """Attribute of a response that holds its operating point: angles of the driven joints (rad)."""
+GEAR_ANGLE = "gear_angle_rad"
+"""Attribute that holds mean motor angles times gear ratio (rad)."""
+GEAR_TORQUE = "gear_torque_nm"
+"""Attribute that holds mean motor torques over gear ratio (Nm)."""
 
 # Experiments may start at another motor angle within a turn, so that ripple averages out.
 _TURN_RAD = 2 * np.pi
@@ -36,28 +41,61 @@ def expect_one_pose(logs: Sequence[Log], axes: Sequence[int], robot: Robot | Non
         beyond = _TURN_RAD if turns else 0.0
         if robot is not None and turns:
             beyond = min(beyond, _JOINT_RAD / abs(float(robot.gear_ratio[at])))
-        if abs(away[worst]) > swing[at] + beyond:
+        if np.ptp(away) > swing[at] + beyond:
             unit = "rad" if turns else "m"
             raise InputError(
                 f"{logs[worst].name}: operating point: expected mean position of axis {axis} as in the other "
-                f"experiments, got {abs(away[worst]):.3g} {unit} off, motor side; the motion itself is "
+                f"experiments, got means {np.ptp(away):.3g} {unit} apart, motor side; the motion itself is "
                 f"{swing[at]:.3g} {unit}: estimate each operating point apart"
             )
 
 
-def mean_joint_angles(logs: Sequence[Log], robot: Robot | None) -> Real | None:
-    """Return the mean joint positions over all experiments, (n_axes,) [rad; m if prismatic].
+def operating_point(
+    logs: Sequence[Log], robot: Robot | None, *, torque_in_nm: bool
+) -> dict[str, list[float]]:
+    """Return the attributes of a response that state its operating point, means over all experiments.
 
-    From joint encoders if all axes have one, else from motor positions with the gear ratios of the robot;
-    None without both. Motor positions miss the deflection of loaded gears, some mrad.
-    Raises InputError if the robot has another number of axes.
+    With joint encoders on all axes it is their mean. Otherwise it follows from motor positions with the gear
+    ratios and gear stiffnesses of the robot (:func:`joint_angles`); the attributes ``gear_angle_rad`` and
+    ``gear_torque_nm`` then allow to correct it with other stiffnesses. Without both the result is empty.
+    ``torque_in_nm``: whether torques are torques, and no currents. Raises InputError if the robot has another
+    number of axes.
     """
     if robot is not None and robot.n_axes != logs[0].n_axes:
         raise InputError(f"robot: expected {logs[0].n_axes} axes as the logs, got {robot.n_axes}")
-    joints = [log.joint_position_rad for log in logs]
-    if all(found is not None and np.isfinite(found).all() for found in joints):
-        return np.asarray(np.mean([np.mean(found, axis=0) for found in joints if found is not None], axis=0))
+    joints = [
+        x for log in logs if (x := log.joint_position_rad) is not None and np.isfinite(x).all()
+    ]
+    if len(joints) == len(logs):
+        return {OPERATING_POINT: _mean(joints)}
     if robot is None:
-        return None
-    motors = np.mean([log.position_rad.mean(axis=0) for log in logs], axis=0)
-    return np.asarray(motors * robot.gear_ratio)
+        return {}
+    ratio = np.asarray(robot.gear_ratio)
+    angle = np.array(_mean([log.position_rad for log in logs])) * ratio
+    torque = np.zeros(robot.n_axes)
+    if torque_in_nm:
+        torque = np.nan_to_num(_mean([log.torque_nm for log in logs])) / ratio
+    return {
+        OPERATING_POINT: joint_angles(robot, angle, torque).tolist(),
+        GEAR_ANGLE: angle.tolist(),
+        GEAR_TORQUE: torque.tolist(),
+    }
+
+
+def joint_angles(robot: Robot, gear_angle_rad: ArrayLike, gear_torque_nm: ArrayLike) -> Real:
+    """Return the angles of the driven joints, (n_axes,) [rad]: gear angles less the deflections of the gears.
+
+    ``gear_angle_rad`` are motor angles times gear ratio, ``gear_torque_nm`` mean motor torques over gear
+    ratio. A gear deflects by torque over stiffness; an axis without stiffness is rigid.
+    """
+    known = robot.parameters()
+    names = [robot.joint_names[joint] for joint in robot.axis_joints]
+    stiffness = np.array([known.get(f"{name}.stiffness", 0.0) for name in names])
+    torque = np.asarray(gear_torque_nm, float)
+    deflection = np.divide(torque, stiffness, out=np.zeros_like(torque), where=stiffness > 0)
+    return np.asarray(np.asarray(gear_angle_rad, float) - deflection)
+
+
+def _mean(signals: Sequence[Real]) -> list[float]:
+    found: list[float] = np.mean([signal.mean(axis=0) for signal in signals], axis=0).tolist()
+    return found

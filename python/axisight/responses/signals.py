@@ -71,7 +71,9 @@ def _reference(log: Log, at: Sequence[int]) -> Real | None:
 
 def units(logs: Sequence[Log], axes: Sequence[int]) -> tuple[str, str]:
     """Return the units of input and output over the axes; raise InputError if axes mix Nm and A."""
-    found = {(_input_unit(log, axis - 1), _output_unit(log, axis - 1)) for log in logs for axis in axes}
+    found = {
+        (_input_unit(log, axis - 1), _output_unit(log, axis - 1)) for log in logs for axis in axes
+    }
     inputs = sorted({unit for unit, _ in found})
     outputs = sorted({unit for _, unit in found})
     if "A" in inputs and len(inputs) > 1:

@@ -33,7 +33,9 @@ def frf_command(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", help="NetCDF file to write (.nc), which 'axisight identify elastic' reads."
+            "--out",
+            "-o",
+            help="NetCDF file to write (.nc), which 'axisight identify elastic' reads.",
         ),
     ] = None,
     robot: Annotated[
@@ -86,7 +88,8 @@ def frf_command(
     bandwidth_hz: Annotated[
         float | None,
         typer.Option(
-            rich_help_panel=ESTIMATE, help="Half width of the window of the estimator spectral (Hz)."
+            rich_help_panel=ESTIMATE,
+            help="Half width of the window of the estimator spectral (Hz).",
         ),
     ] = None,
     period_s: Annotated[
@@ -129,7 +132,14 @@ def frf_command(
         targets.check([*read, *(p for p in (columns, design) if p is not None)], force=force)
         machine = None if robot is None else load_robot(robot)
         found = response_of_logs(
-            read_logs(logs, columns, machine, unchecked=unchecked, used=Used(start_s, stop_s)),
+            read_logs(
+                logs,
+                columns,
+                machine,
+                unchecked=unchecked,
+                used=Used(start_s, stop_s),
+                broadband=True,
+            ),
             robot=machine,
             design=None if design is None else _design(design),
             estimator=estimator.replace("-", "_"),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from rich.table import Table
 
+from axisight.arguments import counted
 from axisight.cli.common import say
 from axisight.cli.screen import OUT
-from axisight.records import FindingKind
+from axisight.records import FindingKind, RecordFinding
 from axisight.responses import OPERATING_POINT, LogResponse
 
 # Findings that the lines about period, lines and periods already state.
@@ -20,14 +22,26 @@ def show(found: LogResponse) -> None:
     for text in found.choices:
         say(text)
     say(_operating_point(found))
-    for finding in found.findings:
-        if finding.serious:
-            say(f"warning: {finding}")
-        elif finding.kind not in _STATED:
-            say(str(finding))
+    for text in _findings(found.findings):
+        say(text)
     OUT.print(_table(found))
     for text in found.account.sentences:
         say(text)
+
+
+def _findings(findings: Sequence[RecordFinding]) -> list[str]:
+    """Return the worst finding of each kind, serious ones as warnings, with the number of the others."""
+    out = []
+    groups: dict[tuple[FindingKind, bool], list[RecordFinding]] = {}
+    for finding in findings:
+        if finding.serious or finding.kind not in _STATED:
+            groups.setdefault((finding.kind, finding.serious), []).append(finding)
+    for (_, serious), group in groups.items():
+        worst = max(group, key=lambda one: -math.inf if math.isnan(one.value) else abs(one.value))
+        others = len(group) - 1
+        more = f" ({counted(others, 'more finding')} of this kind)" if others else ""
+        out.append(f"{'warning: ' if serious else ''}{worst}{more}")
+    return out
 
 
 def _operating_point(found: LogResponse) -> str:
@@ -42,9 +56,10 @@ def _operating_point(found: LogResponse) -> str:
 
 def _table(found: LogResponse) -> Table:
     table = Table()
-    titles = ("band [Hz]", "lines", "noise", "distortion", "off-diagonal", "coherence", "weak", "lost")
+    titles = ("band [Hz]", "lines", "noise", "distortion", "off-diag.", "coherence", "weak")
     for title in titles:
-        table.add_column(title, justify="left" if title == titles[0] else "right")
+        left = title == titles[0]
+        table.add_column(title, justify="left" if left else "right", no_wrap=True)
     for row in found.account.bands.to_dict("records"):
         table.add_row(
             f"{row['low_hz']:.3g} .. {row['high_hz']:.3g}",
@@ -52,7 +67,6 @@ def _table(found: LogResponse) -> Table:
             *(_percent(row[name]) for name in ("noise", "distortion", "off_diagonal")),
             "-" if math.isnan(row["coherence"]) else f"{row['coherence']:.4f}",
             f"{row['weak']:.0f}",
-            f"{row['lost']:.0f}",
         )
     return table
 
