@@ -174,9 +174,9 @@ def excite(design: ExcitationDesign, robot: Robot | None = None) -> Excited:
             "realizations: expected 1, or a multisine with optimized or random phases, got "
             f"{design.realizations} of {design.signal.kind}, phases {design.signal.phases}"
         )
-    signals = [
-        _signal(part, robot.sample_time_s) for part in _phases(design.signal, design.realizations)
-    ]
+    signals = [_signal(design.signal, robot.sample_time_s, design.signal.seed)]
+    for part, seed in _further_phases(design.signal, signals[0][0], design.realizations):
+        signals.append(_signal(part, robot.sample_time_s, seed))
     sets = [
         _experiments(design, robot, signal, realization)
         for realization, (signal, _) in enumerate(signals)
@@ -189,14 +189,17 @@ def excite(design: ExcitationDesign, robot: Robot | None = None) -> Excited:
     return Excited(made, signal, search, _report(design, made, robot))
 
 
-def _phases(signal: SignalDesign, realizations: int) -> list[tuple[SignalDesign, int]]:
-    """Return the signal for each realization, with the seed of its phases; all have the lines of the first.
+def _further_phases(
+    design: SignalDesign, first: Multisine | PeriodicSignal, realizations: int
+) -> list[tuple[SignalDesign, int]]:
+    """Return the signals after the first, and the seeds of their phases; all have the lines of the first.
 
     Random phases take the next run, optimized ones the next seed, since a search uses several runs.
     """
+    same = {"lines": first.lines.tolist(), "band_hz": None, "grid": "full"}
     return [
-        (signal.model_copy(update={"run": signal.run + m}), signal.seed + m)
-        for m in range(realizations)
+        (design.model_copy(update={**same, "run": design.run + m}), design.seed + m)
+        for m in range(1, realizations)
     ]
 
 
@@ -242,9 +245,8 @@ def _report(design: ExcitationDesign, made: References, robot: Robot) -> LimitRe
 
 
 def _signal(
-    part: tuple[SignalDesign, int], sample_time_s: float
+    s: SignalDesign, sample_time_s: float, seed_of_phases: int
 ) -> tuple[Multisine | PeriodicSignal, CrestSearch | None]:
-    s, seed_of_phases = part
     if s.kind == "multisine":
         made, search = _multisine(s, sample_time_s, seed_of_phases)
         return made.scaled(peak=s.peak_rad_s), search

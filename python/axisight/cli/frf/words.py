@@ -72,4 +72,6 @@ def _table(found: LogResponse) -> Table:
 
 
 def _percent(share: float) -> str:
-    return "-" if math.isnan(share) else f"{100 * share:.2g} %"
+    if math.isnan(share):
+        return "-"
+    return f"{100 * share:.0f} %" if share >= 0.995 else f"{100 * share:.2g} %"
