@@ -18,6 +18,8 @@ T = TypeVar("T")
 _SINGULAR = 1e3
 # Least correlation of copies; a shift by half a sample lowers it a little, other phases lower it to about 0.2.
 _COPY = 0.99
+# Amplitude of a channel, relative to the largest, below which it is not excited at a line.
+_SILENT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -85,11 +87,15 @@ def _repeats(records: PeriodicRecords, index: Sequence[int], n: int) -> bool:
     if len(index) <= n:
         return False
     spectrum = np.fft.rfft(_signal(records), axis=1)[list(index)]
-    spectrum[:, 0] = 0.0
+    size = np.abs(spectrum)
+    # Phases alone, at excited lines: a strong square wave is the same in all experiments.
+    there = size > _SILENT * size.max()
+    there &= np.isin(np.arange(spectrum.shape[1]), records.lines)[:, None]
+    phase = np.where(there, spectrum / np.where(there, size, 1.0), 0.0)
     for i in range(n, len(index)):
-        one, other = spectrum[i], spectrum[i % n]
-        correlation = np.fft.irfft(np.sum(one * np.conj(other), axis=1))
-        energy = [np.fft.irfft(np.sum(np.abs(x) ** 2, axis=1))[0] for x in (one, other)]
-        if correlation.max() < _COPY * np.sqrt(energy[0] * energy[1]):
+        one, other = phase[i], phase[i % n]
+        across = np.fft.irfft(np.sum(one * np.conj(other), axis=1))
+        full = np.fft.irfft(np.sum(np.abs(one) ** 2, axis=1))[0]
+        if across.max() < _COPY * full:
             return False
     return True

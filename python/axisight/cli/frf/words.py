@@ -16,6 +16,12 @@ from axisight.responses import OPERATING_POINT, LogResponse
 # Findings that the lines about period, lines and periods already state.
 _STATED = (FindingKind.PERIOD, FindingKind.LINES)
 
+# What findings advise -> the option that does it.
+_OPTIONS = {
+    "use the local polynomial method": "take --estimator local-polynomial",
+    "give lines": "give --design REFERENCES",
+}
+
 
 def show(found: LogResponse) -> None:
     """Print what was chosen, what was seen, noise and distortion by band, and what to do next."""
@@ -40,7 +46,10 @@ def _findings(findings: Sequence[RecordFinding]) -> list[str]:
         worst = max(group, key=lambda one: -math.inf if math.isnan(one.value) else abs(one.value))
         others = len(group) - 1
         more = f" ({counted(others, 'more finding')} of this kind)" if others else ""
-        out.append(f"{'warning: ' if serious else ''}{worst}{more}")
+        said = str(worst)
+        for words, option in _OPTIONS.items():
+            said = said.replace(words, option)
+        out.append(f"{'warning: ' if serious else ''}{said}{more}")
     return out
 
 
