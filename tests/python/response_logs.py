@@ -15,9 +15,7 @@ from axisight.robot import Robot
 STEP_S = 1e-3
 
 
-def log(
-    name: str, torque, position, reference=None, step_s: float = STEP_S, joint=None
-) -> Log:
+def log(name: str, torque, position, reference=None, step_s: float = STEP_S, joint=None) -> Log:
     """Return a log of arrays (n, axes)."""
     return Log(
         name=name,

@@ -14,7 +14,10 @@ from axisight.display.summary import summarized
 from axisight.errors import InputError
 
 _HALF_WIDTH = 10  # lines on either side that share one noise level
-_CLEAR_GAP_DB, _LEAST_ABOVE = 10.0, 10  # a gap between levels that separates excited lines from others
+_CLEAR_GAP_DB, _LEAST_ABOVE = (
+    10.0,
+    10,
+)  # a gap between levels that separates excited lines from others
 _LOWEST_DB = -60.0  # weaker lines are no part of what comes close to the excitation
 _SHAPE = "numbers of shape (n_experiments, n_periods, n_samples, n_channels)"
 
@@ -106,7 +109,8 @@ def widest_gap(signal: Real) -> float | None:
     """Return a floor [dB] in the widest gap between the levels of lines; None without a clear gap.
 
     ``signal`` is that of :func:`excited_lines`. A clear gap is at least 10 dB wide, with at least 10 lines above
-    it and lines below it that are within 60 dB of the strongest. Use it where distortion or noise is within 40 dB of the strongest line.
+    it and lines below it that are within 60 dB of the strongest. Use it where distortion or noise is within
+    40 dB of the strongest line.
     """
     level = _relative(reals("signal", signal, _SHAPE, 4)).max(axis=(0, 2))
     ordered = 20 * np.log10(np.sort(level[level > 10 ** (_LOWEST_DB / 20)])[::-1])

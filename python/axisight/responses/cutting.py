@@ -84,7 +84,7 @@ def _explains(reference: Real, n_samples: int) -> bool:
     """Whether a reference repeats with a period wherever it moves, but for changes of experiment."""
     covered = sum(stop - start for start, stop in _repeating(reference, n_samples))
     still = np.abs(reference).max(axis=1) <= _SAME * np.abs(reference).max()
-    return covered > _MOSTLY * np.count_nonzero(~still)
+    return bool(covered > _MOSTLY * np.count_nonzero(~still))
 
 
 def cut_at_changes(runs: Sequence[Experiment], n_samples: int) -> list[Cut]:

@@ -97,8 +97,9 @@ def test_elastic_reads_it(tmp_path: Path) -> None:
         "--start", "axis*.stiffness=2.5e6", "-o", fitted,
     )  # fmt: skip
     assert "operating points moved by up to" in said
-    wanted, found = axisight.robot_parameters(robot), axisight.robot_parameters(
-        axisight.load_robot(fitted)
+    wanted, found = (
+        axisight.robot_parameters(robot),
+        axisight.robot_parameters(axisight.load_robot(fitted)),
     )
     for name in names:
         # Noise is 1e-4 of the response at 59 lines; the transient left is of that size.
@@ -121,7 +122,10 @@ def test_what_is_refused(exact: list[Path], tmp_path: Path) -> None:
     assert "--out" in run("frf", *exact, "-o", taken, code=2)
 
 
-EXCITE = "excite --robot irb6600_like --period-s 0.5 --band-hz 4,60 --peak-rad-s 8 --directions t2".split()
+EXCITE = [
+    *("excite", "--robot", "irb6600_like", "--period-s", "0.5", "--band-hz", "4,60"),
+    *("--peak-rad-s", "8", "--directions", "t2"),
+]
 
 
 def test_realizations_share_lines_and_differ_in_phases(tmp_path: Path) -> None:

@@ -29,6 +29,7 @@ MODULES = (
     axisight.montecarlo,
     axisight.mujoco,
     axisight.records,
+    axisight.responses,
     axisight.rigid_body,
     axisight.robot_file,
     axisight.robot_export,

@@ -32,7 +32,7 @@ def said(line: str) -> str:
 
 def rows(page: str, title: str) -> list[list[str]]:
     """Return the cells of the table that begins with a title."""
-    table = page[page.index(f"| {title} |") :].split("\n\n")[0]
+    table = page[page.index(f"| {title} |") :].split("\n\n", maxsplit=1)[0]
     return [[cell.strip() for cell in row.split("|")[1:-1]] for row in table.splitlines()[2:]]
 
 

@@ -131,7 +131,9 @@ def test_seven_sines_in_a_window_are_one_period():
 def test_a_gap_in_the_levels_separates_lines_from_distortion():
     """Distortion within 40 dB of the excitation repeats as well; nothing below 10 dB or 10 lines is a gap."""
     n, lines = 1000, np.arange(10, 60)
-    weaker = sum(multisine(n, [k], seed=k, amplitude=0.1 * 0.98 ** (k - 60)) for k in range(60, 400))
+    weaker = sum(
+        multisine(n, [k], seed=k, amplitude=0.1 * 0.98 ** (k - 60)) for k in range(60, 400)
+    )
     signal = np.tile(multisine(n, lines) + weaker, (1, 4, 1))[..., None]
     assert excited_lines(signal).margin_db < 1  # those above -40 dB count
     assert widest_gap(signal) == pytest.approx(-10, abs=0.1)

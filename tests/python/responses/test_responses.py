@@ -35,7 +35,8 @@ def test_every_estimator_is_exact_without_noise(estimator: str) -> None:
     """The local rational method smooths over harmonics: curvature over a window of 4 lines biases by 1e-4."""
     lines = np.arange(3, 60, 2)
     found = response_of_logs(
-        periodic_logs(realizations=1 if estimator == "fast" else 2, lines=lines), estimator=estimator
+        periodic_logs(realizations=1 if estimator == "fast" else 2, lines=lines),
+        estimator=estimator,
     )
     assert error(found) < (1e-3 if estimator == "local_rational" else ROUNDING)
 
@@ -160,14 +161,18 @@ def test_logs_that_do_not_repeat_give_a_local_model() -> None:
     y = np.zeros_like(u)
     for t in range(1, 4000):
         y[:, t] = 0.6 * y[:, t - 1] + u[:, t] @ np.array([[1.0, 0.3], [0.2, 0.5]])
-    found = response_of_logs([log(f"e{e}", u[e], y[e], u[e]) for e in range(2)], quantity="position")
+    found = response_of_logs(
+        [log(f"e{e}", u[e], y[e], u[e]) for e in range(2)], quantity="position"
+    )
     frequency = found.response["frequency_hz"].values
     pole = 1 / (1 - 0.6 * np.exp(-2j * np.pi * frequency * 1e-3))
     exact = pole[:, None, None] * np.array([[1.0, 0.2], [0.3, 0.5]])
     assert np.abs(found.response["response"].values - exact).max() < 1e-9
     assert "the logs do not repeat" in found.choices[-1]
     spectral = response_of_logs(
-        [log(f"e{e}", u[e], y[e], u[e]) for e in range(2)], quantity="position", estimator="spectral"
+        [log(f"e{e}", u[e], y[e], u[e]) for e in range(2)],
+        quantity="position",
+        estimator="spectral",
     )
     near = np.abs(spectral.response["response"].values - exact)
     # Lines at the edges have too few neighbours.

@@ -59,7 +59,9 @@ def test_a_period_that_is_not_whole() -> None:
 
 def test_no_reference_for_joint_input_output() -> None:
     bare = [replace(one, velocity_ref_rad_s=None) for one in periodic_logs()]
-    assert "reference: expected velocity references" in refused(bare, estimator="joint_input_output")
+    assert "reference: expected velocity references" in refused(
+        bare, estimator="joint_input_output"
+    )
     assert response_of_logs(bare).choices[0].endswith("found from the torque")
 
 
