@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from numpy.typing import ArrayLike
 
-from axisight.arguments import instance, one_of, reals, several
+from axisight.arguments import instance, one_of, positive, reals, several, whole
 from axisight.errors import InputError
 from axisight.excitation import References
 from axisight.frf.quantity import RATES, Quantity
@@ -85,8 +85,17 @@ def response_of_logs(
     one_of("average", "none" if average is None else average, MEANS)
     one_of("quantity", quantity, RATES)
     options = Options(
-        design, estimator, average, quantity, period_s, _band(band_hz), bandwidth_hz, drop_periods
+        None if design is None else instance("design", design, References),
+        estimator,
+        average,
+        quantity,
+        None if period_s is None else positive("period_s", period_s),
+        _band(band_hz),
+        None if bandwidth_hz is None else positive("bandwidth_hz", bandwidth_hz),
+        None if drop_periods is None else whole("drop_periods", drop_periods, 0),
     )
+    if robot is not None:
+        instance("robot", robot, Robot)
     _expect_one_rate(given, design)
     return _response(given, chosen_axes(given, axes), robot, operating_point_rad, options)
 
@@ -124,7 +133,10 @@ def _response(
 def _band(band_hz: tuple[float, float] | None) -> tuple[float, float] | None:
     if band_hz is None:
         return None
-    low, high = band_hz
+    found = reals("band_hz", band_hz, "two frequencies LOW, HIGH", 1)
+    if len(found) != 2:
+        raise InputError(f"band_hz: expected two frequencies LOW, HIGH, got {len(found)}")
+    low, high = (float(f) for f in found)
     if not 0 <= low < high:
         raise InputError(f"band_hz: expected 0 <= LOW < HIGH, got {low:g}, {high:g}")
     return low, high

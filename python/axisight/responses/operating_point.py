@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from axisight.arguments import Real
+from axisight.arguments import Real, instance, reals
 from axisight.errors import InputError
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -86,14 +86,26 @@ def joint_angles(robot: Robot, gear_angle_rad: ArrayLike, gear_torque_nm: ArrayL
     """Return the angles of the driven joints, (n_axes,) [rad]: gear angles less the deflections of the gears.
 
     ``gear_angle_rad`` are motor angles times gear ratio, ``gear_torque_nm`` mean motor torques over gear
-    ratio. A gear deflects by torque over stiffness; an axis without stiffness is rigid.
+    ratio. A gear deflects by torque over stiffness; an axis without stiffness is rigid. Raises InputError for
+    other shapes, and for numbers that are not finite.
     """
+    instance("robot", robot, Robot)
+    angle, torque = (
+        _by_axis(field, given, robot.n_axes)
+        for field, given in (("gear_angle_rad", gear_angle_rad), ("gear_torque_nm", gear_torque_nm))
+    )
     known = robot.parameters()
     names = [robot.joint_names[joint] for joint in robot.axis_joints]
     stiffness = np.array([known.get(f"{name}.stiffness", 0.0) for name in names])
-    torque = np.asarray(gear_torque_nm, float)
     deflection = np.divide(torque, stiffness, out=np.zeros_like(torque), where=stiffness > 0)
-    return np.asarray(np.asarray(gear_angle_rad, float) - deflection)
+    return np.asarray(angle - deflection)
+
+
+def _by_axis(field: str, given: object, n_axes: int) -> Real:
+    found = reals(field, given, "numbers of shape (n_axes,)", 1)
+    if len(found) != n_axes:
+        raise InputError(f"{field}: expected {n_axes} numbers, one for each axis, got {len(found)}")
+    return found
 
 
 def _mean(signals: Sequence[Real]) -> list[float]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from axisight.arguments import Real
+from axisight.arguments import Real, several, whole
 from axisight.errors import InputError
 from axisight.logs import Log
 from axisight.records import Experiment
@@ -26,9 +26,9 @@ def chosen_axes(logs: Sequence[Log], axes: Sequence[int] | None) -> tuple[int, .
                 f"logs: expected {n} axes as in {logs[0].name}, got {log.n_axes} in {log.name}"
             )
     if axes is not None:
-        given = tuple(axes)
+        given = tuple(whole("axes", axis) for axis in several("axes", axes))
         for axis in given:
-            if not 1 <= axis <= n:
+            if axis > n:
                 raise InputError(f"axes: expected numbers from 1 to {n}, got {axis}")
         if len(set(given)) < len(given) or not given:
             raise InputError(f"axes: expected each axis once, got {list(given)}")

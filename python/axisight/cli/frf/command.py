@@ -121,10 +121,10 @@ def frf_command(
     unchecked: Unchecked = False,
     force: Force = False,
 ) -> None:
-    """Frequency response of a robot at one operating point, from motor torque to motor motion.
+    """Estimate the frequency response of a robot from the logs of one operating point.
 
-    Prints what was chosen and why, and what is noise, what is distortion and which lines are weak. --out
-    writes the response with its variance and operating point.
+    The response leads from motor torques to motor motions. Prints what was chosen and why, what is noise, what
+    is distortion, and which lines are weak. --out writes the response with variance and operating point.
     """
     with errors(), as_options(ctx):
         targets = Targets(out, plot)
