@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -21,6 +22,7 @@ from axisight import Effect, excitation, frf, records
 from axisight.blind.plots import plot_calibration, plot_confusion
 from axisight.cli.demo import write_demo_case
 from axisight.excitation.plots import plot_references, plot_signal
+from axisight.responses import plot_levels
 
 PAGE = Path(__file__).resolve().parent / "plots.md"
 PICTURES = PAGE.parent / "images" / "plots"
@@ -70,6 +72,10 @@ SHOWN = {
     "axisight.plot_bode": (
         "responses, output=1, input=2",
         "One element of a frequency response, with 95 % bands.",
+    ),
+    "axisight.responses.plot_levels": (
+        "response",
+        "A frequency response beside the standard deviations of its noise and of noise and distortion.",
     ),
     "axisight.excitation.plots.plot_signal": (
         "signal",
@@ -125,11 +131,34 @@ def figures() -> dict[str, Callable[[], Figure]]:
         "plot_bode": lambda: axisight.plot_bode(
             {"all periods": all_, "two periods": two}, output=1, input=2
         ),
+        "plot_levels": lambda: plot_levels(with_distortion()),
         "plot_signal": lambda: plot_signal(signal),
         "plot_references": lambda: plot_references(made),
         "plot_confusion": lambda: plot_confusion(score),
         "plot_calibration": lambda: plot_calibration(score),
     }
+
+
+def with_distortion() -> xr.Dataset:
+    """Return a response from three realizations of an arm with dry friction."""
+    robot = axisight.load_robot("irb6600_like")
+    friction = [Effect("coulomb_friction", axis, {"coulomb_nm": 0.5}) for axis in (1, 2, 3)]
+    experiments = []
+    for run in range(3):
+        tones = excitation.multisine(1.0, robot.sample_time_s, band_hz=(2.0, 60.0), run=run)
+        made = excitation.references(tones.scaled(peak=8.0), robot.n_axes, directions="t2")
+        reference = np.tile(made.period, (1, 12, 1))
+        runs = axisight.simulate_batch(
+            robot, reference, effects=friction, noise_seed=0, first_run=3 * run
+        )
+        experiments += [
+            records.Experiment(robot.sample_time_s, torque, position, one)
+            for torque, position, one in zip(
+                runs["torque_cmd_nm"].values, runs["position_rad"].values, reference, strict=True
+            )
+        ]
+    prepared = records.prepare_records(experiments, drop_periods=8)
+    return frf.logarithmic_mean(prepared.records, quantity="acceleration")
 
 
 def render() -> str:

@@ -21,6 +21,10 @@ class RobotError(InputError):
     """A robot model cannot be used."""
 
 
+class NotPeriodicError(InputError):
+    """A signal does not repeat within its record."""
+
+
 class OutputError(InputError, OSError):
     """A file or folder cannot be written; the message says which, and what is in the way."""
 

@@ -46,6 +46,11 @@ _COMMANDS = {
         "Identify",
         "Identify a robot from logs or frequency responses, and write it back as a robot file.",
     ),
+    "frf": (
+        "frf.command:frf_command",
+        "Identify",
+        "Estimate the frequency response of a robot from the logs of one operating point.",
+    ),
     "excite": (
         "excite:excite_command",
         "Identify",

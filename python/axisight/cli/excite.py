@@ -82,6 +82,13 @@ def excite_command(
             help="Directions of the axes by experiment: t1, t2, hadamard or dft.",
         ),
     ] = None,
+    realizations: Annotated[
+        int | None,
+        typer.Option(
+            rich_help_panel=SIGNAL,
+            help="Sets of experiments, each with phases of its own at the same lines: they show distortion.",
+        ),
+    ] = None,
     square: Annotated[
         str | None,
         typer.Option(
@@ -117,6 +124,14 @@ def excite_command(
             help="Torque limit of each motor, or of all (Nm).",
         ),
     ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ANGLE,...",
+            rich_help_panel=LIMITS,
+            help="Driven joint angles at which the check starts (rad). Default: the operating point.",
+        ),
+    ] = None,
     plot: Annotated[
         Path | None,
         typer.Option(
@@ -149,9 +164,15 @@ def excite_command(
             "velocity_rad_s": one_or_each("--velocity-limit", velocity_limit),
             "acceleration_rad_s2": one_or_each("--acceleration-limit", acceleration_limit),
             "torque_nm": one_or_each("--torque-limit", torque_limit),
+            "start_rad": _numbers("--start", start),
         }
         _replace(data, "limits", **limits)
-        top = {"robot": robot, "directions": directions, "dc_level_rad_s": dc_level_rad_s}
+        top = {
+            "robot": robot,
+            "directions": directions,
+            "realizations": realizations,
+            "dc_level_rad_s": dc_level_rad_s,
+        }
         data |= {name: value for name, value in top.items() if value is not None}
         checked = read_design(data, "options" if design is None else str(design))
         texts = parse_effects(effect)

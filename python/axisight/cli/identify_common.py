@@ -66,17 +66,19 @@ def read_logs(
     *,
     unchecked: bool,
     used: Used = WHOLE,
+    broadband: bool = False,
 ) -> list[Log]:
     """Return the ``used`` part of logs that pass ``axisight check``; print its warnings.
 
     The check is needed because identification also fits data in wrong units or with missing rows. Raises
     InputError for errors of the check and faults that :func:`check_fit_inputs` refuses, unless ``unchecked``.
+    ``broadband``: references exceed the bandwidth of the loop, so no warning says that motors do not follow.
     Raises InputError for a revolute axis where the robot has a prismatic one, and the reverse.
     """
     logs = []
     said: set[tuple[str, str]] = set()
     for path in paths:
-        said |= _checked(path, columns, unchecked=unchecked)
+        said |= _checked(path, columns, unchecked=unchecked, broadband=broadband)
         log = read_log(path, columns, robot=robot)
         slides = [kind == "prismatic" for kind in log.axis_kinds]
         if robot is not None and slides != list(robot.axis_is_prismatic):
@@ -94,7 +96,9 @@ def read_logs(
     return logs
 
 
-def _checked(path: Path, columns: Path | None, *, unchecked: bool) -> set[tuple[str, str]]:
+def _checked(
+    path: Path, columns: Path | None, *, unchecked: bool, broadband: bool
+) -> set[tuple[str, str]]:
     """Print the warnings of ``axisight check`` and return them as (name of the log, message).
 
     Raises InputError for errors without a stable name, unless ``unchecked``. Errors with a name are refused
@@ -102,6 +106,12 @@ def _checked(path: Path, columns: Path | None, *, unchecked: bool) -> set[tuple[
     """
     said = set()
     for finding in check_log(path, columns).findings:
+        if (
+            broadband
+            and finding.column.startswith("velocity_ref")
+            and finding.severity == "warning"
+        ):
+            continue
         text = f"{path.name}: {finding.column}: {finding.message}"
         if finding.severity == "error" and not finding.name and not unchecked:
             raise InputError(f"{text} (correct it in a column map, or go on with --unchecked)")
@@ -136,7 +146,7 @@ def options(ctx: typer.Context) -> dict[str, Any]:
     for name, value in ctx.params.items():
         if isinstance(value, list | tuple):
             out[name] = [v.name if isinstance(v, Path) else v for v in value]
-        elif name not in ("robot", "out", "force"):
+        elif name not in ("robot", "out", "plot", "force"):
             out[name] = value.name if isinstance(value, Path) else value
     return out
 
@@ -180,15 +190,20 @@ def option_words(text: str, options: Collection[str]) -> str:
 
 
 def provenance(
-    method: str, files: Sequence[Path], settings: Mapping[str, Any], columns: Path | None = None
+    method: str,
+    files: Sequence[Path],
+    settings: Mapping[str, Any],
+    columns: Path | None = None,
+    *,
+    command: str = "axisight identify",
 ) -> Provenance:
-    """Return the provenance of identified values: hashes of logs and column map, and the given options."""
+    """Return the provenance of what a command finds: hashes of logs and column map, and the given options."""
     files = [part for path in files for part in files_of(path)]
     files += [] if columns is None else [column_file(columns)]
     count = Counter(path.name for path in files)
     names = [path.name if count[path.name] == 1 else str(path) for path in files]
     return Provenance(
-        f"axisight identify {method}",
+        f"{command} {method}",
         {name: hash_file(path) for name, path in zip(names, files, strict=True)},
         {name: value for name, value in settings.items() if value is not None},
     )

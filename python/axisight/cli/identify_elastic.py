@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
@@ -31,17 +32,24 @@ from axisight.effects import effect_info
 from axisight.errors import InputError
 from axisight.fitting import robot_parameters
 from axisight.frf.interop import load_netcdf
+from axisight.responses.operating_point import (
+    GEAR_ANGLE,
+    GEAR_TORQUE,
+    OPERATING_POINT,
+    joint_angles,
+)
 from axisight.robot import Robot
 
 if TYPE_CHECKING:
-    from axisight.frequency_fit import FrequencyFit
+    from axisight.frequency_fit import FrequencyFit, FrequencyFitOptions
     from axisight.frequency_fit.measured import Sampling
     from axisight.frequency_fit.options import Criterion
 
+Data = list[tuple[list[float], xr.Dataset]]
 _USUAL = ("*.stiffness", "*.damping")
+# Change of an operating point (rad) that no response shows.
+_SAME_POSE_RAD = 1e-5
 _CONVERGED = ("loss_converged", "step_converged", "exact")
-POSE = "joint_angle_rad"
-"""Attribute of a response that holds its operating point."""
 
 
 def elastic_command(
@@ -49,7 +57,9 @@ def elastic_command(
     robot: Annotated[str, typer.Argument(help="robot.toml or a preset: where the search starts.")],
     responses: Annotated[
         list[Path],
-        typer.Argument(help="Frequency responses, one per operating point (NetCDF, save_netcdf)."),
+        typer.Argument(
+            help="Frequency responses, one per operating point (NetCDF, of 'axisight frf')."
+        ),
     ],
     parameters: Annotated[
         list[str] | None,
@@ -63,7 +73,7 @@ def elastic_command(
         typer.Option(
             metavar="ANGLE,...",
             help="Operating point of each response in turn: angles of the driven joints (rad). "
-            f"Default: the attribute {POSE} of the files.",
+            f"Default: the attribute {OPERATING_POINT} of the files.",
         ),
     ] = None,
     out: Out = None,
@@ -71,7 +81,8 @@ def elastic_command(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="Start value of a parameter (repeatable). Default: that of the robot.",
+            help="Start value of a parameter, by name or with wildcards (repeatable), e.g. "
+            "'axis*.stiffness=2e6'. Default: that of the robot.",
         ),
     ] = None,
     criterion: Annotated[
@@ -118,8 +129,8 @@ def elastic_command(
             effect for effect in machine.effects if effect_info(effect.name).linear == "parameters"
         ]
         model = machine.with_effects(linear)
-        data = _responses(machine, responses, at)
         begin = _starts(machine, parameters or list(_USUAL), pairs("--start", start))
+        data = _responses(machine.with_parameters(begin), responses, at)
         search = axisight.frequency_fit.FrequencyFitOptions(
             criterion=cast("Criterion", criterion),
             sampling=cast("Sampling", sampling),
@@ -127,7 +138,7 @@ def elastic_command(
             starts=starts,
             seed=seed,
         )
-        fit = axisight.frequency_fit.fit_responses(model, data, begin, options=search)
+        fit, data = _fit(model, data, begin, search, moves=not at)
         _show(fit)
         if len(linear) < len(machine.effects):
             left = ", ".join(e.label for e in machine.effects if e not in linear)
@@ -146,21 +157,56 @@ def elastic_command(
             raise typer.Exit(1)
 
 
-def _responses(
-    robot: Robot, paths: Sequence[Path], at: Sequence[str] | None
-) -> list[tuple[list[float], xr.Dataset]]:
+def _fit(
+    model: Robot,
+    data: Data,
+    begin: dict[str, float],
+    search: FrequencyFitOptions,
+    *,
+    moves: bool,
+) -> tuple[FrequencyFit, Data]:
+    """Return the fit and the responses with their operating points.
+
+    ``moves``: operating points from motor angles depend on gear stiffnesses. Where the fit changes them, the
+    points move, and a second search starts from the first one's values.
+    """
+    fit = axisight.frequency_fit.fit_responses(model, data, begin, options=search)
+    moved = [(_joint_angles(fit.robot, response) or pose, response) for pose, response in data]
+    change = np.max([np.abs(np.subtract(a, b)) for (a, _), (b, _) in zip(moved, data, strict=True)])
+    if not moves or change < _SAME_POSE_RAD:
+        return fit, data
+    again = replace(search, starts=1)
+    fit = axisight.frequency_fit.fit_responses(
+        model, moved, dict(zip(fit.names, fit.values.tolist(), strict=True)), options=again
+    )
+    say(
+        f"operating points moved by up to {1e3 * change:.2g} mrad, as gears deflect less or more with the "
+        "stiffnesses found; fitted again"
+    )
+    return fit, moved
+
+
+def _joint_angles(robot: Robot, response: xr.Dataset) -> list[float] | None:
+    """Return the operating point with the gear stiffnesses of a robot; None if the response states it alone."""
+    if GEAR_ANGLE not in response.attrs or GEAR_TORQUE not in response.attrs:
+        return None
+    angle, torque = (np.atleast_1d(response.attrs[name]) for name in (GEAR_ANGLE, GEAR_TORQUE))
+    return [float(x) for x in joint_angles(robot, angle, torque)]
+
+
+def _responses(robot: Robot, paths: Sequence[Path], at: Sequence[str] | None) -> Data:
     poses = [numbers("--at", text) for text in at or []]
     if poses and len(poses) != len(paths):
         raise InputError(f"--at: expected one for each of {len(paths)} responses, got {len(poses)}")
     out = []
     for i, path in enumerate(paths):
         response = load_netcdf(path)
-        if not poses and POSE not in response.attrs:
+        if not poses and OPERATING_POINT not in response.attrs:
             raise InputError(
                 f"{path}: operating point: expected --at ANGLE,... once for each response, or the attribute "
-                f"{POSE} of the file, got neither"
+                f"{OPERATING_POINT} of the file, got neither"
             )
-        pose = poses[i] if poses else np.atleast_1d(response.attrs[POSE]).tolist()
+        pose = poses[i] if poses else _stated(robot, response)
         if len(pose) != robot.n_axes:
             raise InputError(
                 f"{path}: operating point: expected {robot.n_axes} angles of driven joints, got "
@@ -168,6 +214,13 @@ def _responses(
             )
         out.append((pose, response))
     return out
+
+
+def _stated(robot: Robot, response: xr.Dataset) -> list[float]:
+    """Return the operating point that a response states, with the gears of the robot if it depends on them."""
+    pose: list[float] = np.atleast_1d(response.attrs[OPERATING_POINT]).tolist()
+    found = _joint_angles(robot, response) if len(pose) == robot.n_axes else None
+    return pose if found is None else found
 
 
 def _starts(robot: Robot, patterns: Sequence[str], given: dict[str, float]) -> dict[str, float]:
@@ -179,10 +232,15 @@ def _starts(robot: Robot, patterns: Sequence[str], given: dict[str, float]) -> d
                 f"--parameters: expected names or patterns of {', '.join(known)}, got {pattern!r}"
             )
     names = [name for name in known if any(fnmatchcase(name, p) for p in patterns)]
-    for name in given:
-        if name not in names:
-            raise InputError(f"--start: expected one of {', '.join(names)}, got {name!r}")
-    return {name: given.get(name, known[name]) for name in names}
+    begin = {name: known[name] for name in names}
+    for pattern, value in given.items():
+        meant = [name for name in names if fnmatchcase(name, pattern)]
+        if not meant:
+            raise InputError(
+                f"--start: expected names or patterns of {', '.join(names)}, got {pattern!r}"
+            )
+        begin |= dict.fromkeys(meant, value)
+    return begin
 
 
 def _show(fit: FrequencyFit) -> None:

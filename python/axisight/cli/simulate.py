@@ -18,6 +18,7 @@ from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.panels import INTEGRATION, SENSOR
 from axisight.cli.robot import GivenEffects, load_simulator, parse_effects
 from axisight.errors import InputError
+from axisight.excitation import References
 from axisight.excitation.files import holds_references, read_references
 from axisight.gap.intake.inputs import read_beside
 from axisight.gap.prepare.used_part import Used
@@ -101,68 +102,117 @@ def simulate_command(
     experiment: Annotated[
         int | None, typer.Option(help="Of references with several: the one to simulate, from 1.")
     ] = None,
+    each: Annotated[
+        bool,
+        typer.Option(
+            "--each",
+            help="Of references with several: simulate each experiment, into OUT-1.parquet, OUT-2.parquet, ... "
+            "The noise is that of --run and the runs after it.",
+        ),
+    ] = False,
     periods: Annotated[int, typer.Option(help="Of references: how many of them.")] = 1,
     force: Force = False,
 ) -> None:
     """Simulate a robot along the references or torques of a log and write the result as a log."""
     with errors():
         given = [*files_of(log), Path(robot), *(x for x in (columns,) if x)]
-        check_targets({"--out": out}, inputs=given, replaces={"--out": (".parquet",)}, force=force)
+        references = read_references(log) if holds_references(log) else None
+        targets = _targets(out, references, experiment, each=each)
+        check_targets(
+            {_named(path, out): path for path in targets.values()},
+            inputs=given,
+            replaces=dict.fromkeys((_named(path, out) for path in targets.values()), (".parquet",)),
+            force=force,
+        )
         options = ModelOptions(base, tip, payload)
         load = partial(load_simulator, given=parse_effects(effect), options=options)
         use = Used(start_s, stop_s, moving)
-        if holds_references(log):
+        if references is not None:
             if torque or not use.whole:
                 raise InputError(
                     f"--from, --to, --moving, --torque: expected a log, got references in {log}"
                 )
-            machine, inputs = _designed(log, robot, load, experiment, periods)
-        elif experiment is not None or periods != 1:
-            raise InputError(f"--experiment, --periods: expected references, got the log {log}")
+            machine = _machine(log, references, robot, load)
+            drives = [_designed(references, number, periods) for number in targets]
+        elif experiment is not None or each or periods != 1:
+            raise InputError(
+                f"--experiment, --each, --periods: expected references, got the log {log}"
+            )
         else:
             machine, (read,) = read_beside(robot, [log], columns, load, bare=options.load)
-            inputs = _inputs(use.one_of(read), machine, torque=torque)
-        result = simulate(
-            machine,
-            **inputs,
-            start_rad=None if start is None else numbers("--start", start),
-            model=cast(Model, model),
-            method=cast(Method, method),
-            tolerance=tolerance,
-            substeps=substeps,
-            noise_seed=noise_seed,
-            run=run,
-            noise_cutoff_hz=noise_cutoff_hz,
-            position_resolution_rad=resolution,
-        )
-        write_bytes(out, _log_table(result, inputs).to_parquet(index=False))
-        say(f"{result.attrs['status']}: {out}")
-        if result.attrs["status"] != "completed":
+            drives = [_inputs(use.one_of(read), machine, torque=torque)]
+        failed = False
+        for k, (path, inputs) in enumerate(zip(targets.values(), drives, strict=True)):
+            result = simulate(
+                machine,
+                **inputs,
+                start_rad=None if start is None else numbers("--start", start),
+                model=cast(Model, model),
+                method=cast(Method, method),
+                tolerance=tolerance,
+                substeps=substeps,
+                noise_seed=noise_seed,
+                run=run + k,
+                noise_cutoff_hz=noise_cutoff_hz,
+                position_resolution_rad=resolution,
+            )
+            write_bytes(path, _log_table(result, inputs).to_parquet(index=False))
+            say(f"{result.attrs['status']}: {path}")
+            failed |= result.attrs["status"] != "completed"
+        if failed:
             raise typer.Exit(1)
 
 
-def _designed(
-    path: Path, source: str, load: Callable[..., Robot], experiment: int | None, periods: int
-) -> tuple[Robot, dict[str, NDArray[np.float64]]]:
-    """Return the robot, and one experiment of designed references as the input of `simulate`.
+def _named(path: Path, out: Path) -> str:
+    """Return the option for an output, with the name of the file if the command chose it."""
+    return "--out" if path == out else f"--out, {path.name}"
 
-    A robot from a model file gets the sample time of the references, unless its drive data state one. Raises
-    InputError for references that are not speeds, another sample time, and a missing experiment.
+
+def _targets(
+    out: Path, references: References | None, experiment: int | None, *, each: bool
+) -> dict[int, Path]:
+    """Return the log to write for each experiment (from 1) of references; one for a log as input.
+
+    Raises InputError for a missing experiment, and if several are there and neither option says which.
     """
-    references = read_references(path)
+    if references is None:
+        return {1: out}
+    count = references.n_experiments
+    if each:
+        if experiment is not None:
+            raise InputError("--each: expected without --experiment, got both")
+        digits = len(str(count))
+        return {
+            e: out.with_name(f"{out.stem}-{e:0{digits}d}{out.suffix}") for e in range(1, count + 1)
+        }
+    if experiment is None and count == 1:
+        experiment = 1
+    if experiment is None or not 1 <= experiment <= count:
+        raise InputError(
+            f"--experiment: expected one of 1 to {count} of the references, or --each, got {experiment}"
+        )
+    return {experiment: out}
+
+
+def _machine(path: Path, references: References, source: str, load: Callable[..., Robot]) -> Robot:
+    """Return the robot. One from a model file gets the sample time of the references, unless its data state one.
+
+    Raises InputError for references that are not speeds, and for another sample time.
+    """
     robot = load(source, sample_time_s=references.sample_time_s if is_model_file(source) else None)
     if references.unit != "rad/s":
         raise InputError(f"{path}: expected velocity references in rad/s, got {references.unit}")
     _same_rate(path, references.sample_time_s, robot)
-    count = len(references.period)
-    if experiment is None and count == 1:
-        experiment = 1
-    if experiment is None or not 1 <= experiment <= count:
-        raise InputError(f"--experiment: expected one of 1 to {count} of {path}, got {experiment}")
+    return robot
+
+
+def _designed(
+    references: References, experiment: int, periods: int
+) -> dict[str, NDArray[np.float64]]:
+    """Return periods of an experiment (from 1) as the input of `simulate`."""
     if periods < 1:
         raise InputError(f"--periods: expected a positive number, got {periods}")
-    period = references.period[experiment - 1]
-    return robot, {"velocity_ref_rad_s": np.tile(period, (periods, 1))}
+    return {"velocity_ref_rad_s": np.tile(references.period[experiment - 1], (periods, 1))}
 
 
 def _inputs(log: Log, robot: Robot, *, torque: bool) -> dict[str, NDArray[np.float64]]:

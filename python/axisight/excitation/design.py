@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from axisight.arguments import instance, path_of, shown
@@ -80,26 +81,33 @@ class SquareDesign(_Part):
 
 
 class LimitDesign(_Part):
-    """Limits of the motors, one number or one per axis, and the number of periods to simulate."""
+    """Limits of the motors, one number or one per axis, and the number of periods to simulate.
+
+    ``start_rad`` are the driven joint angles [rad] at which the simulation starts; None is the operating point
+    of the robot.
+    """
 
     velocity_rad_s: PerAxis | None = None
     acceleration_rad_s2: PerAxis | None = None
     torque_nm: PerAxis | None = None
     periods: Count = 2
     model: Literal["linear", "nonlinear"] = "nonlinear"
+    start_rad: list[float] | None = None
 
 
 class ExcitationDesign(_Part):
     """The design of references for a robot (file or preset).
 
     ``directions`` is ``"t1"``, ``"t2"``, ``"hadamard"``, ``"dft"`` or a matrix with one row per axis
-    and one column per experiment. Without ``limits`` there is no simulation.
+    and one column per experiment. ``realizations`` is the number of sets of these experiments; each has phases
+    of its own, at the same lines. Without ``limits`` there is no simulation.
     """
 
     schema_: Annotated[Literal["axisight.excite/1"], Field(alias="schema")] = "axisight.excite/1"
     robot: str
     signal: SignalDesign
     directions: Literal["t1", "identity", "t2", "hadamard", "dft"] | list[list[float]] = "t1"
+    realizations: Count = 1
     square: SquareDesign | None = None
     dc_level_rad_s: float | list[float] = 0.0
     limits: LimitDesign | None = None
@@ -159,9 +167,51 @@ def excite(design: ExcitationDesign, robot: Robot | None = None) -> Excited:
     """
     instance("design", design, ExcitationDesign)
     robot = load_robot(design.robot) if robot is None else instance("robot", robot, Robot)
-    signal, search = _signal(design.signal, robot.sample_time_s)
+    if design.realizations > 1 and (
+        design.signal.kind != "multisine" or design.signal.phases == "schroeder"
+    ):
+        raise InputError(
+            "realizations: expected 1, or a multisine with optimized or random phases, got "
+            f"{design.realizations} of {design.signal.kind}, phases {design.signal.phases}"
+        )
+    signals = [_signal(design.signal, robot.sample_time_s, design.signal.seed)]
+    for part, seed in _further_phases(design.signal, signals[0][0], design.realizations):
+        signals.append(_signal(part, robot.sample_time_s, seed))
+    sets = [
+        _experiments(design, robot, signal, realization)
+        for realization, (signal, _) in enumerate(signals)
+    ]
+    made = replace(sets[0], period=np.concatenate([part.period for part in sets]))
+    made.design["excite"] = design.model_dump(by_alias=True, mode="json")
+    if len(sets) > 1:
+        made.design["broadband_of_realizations"] = [part.design["broadband"] for part in sets]
+    signal, search = signals[0]
+    return Excited(made, signal, search, _report(design, made, robot))
+
+
+def _further_phases(
+    design: SignalDesign, first: Multisine | PeriodicSignal, realizations: int
+) -> list[tuple[SignalDesign, int]]:
+    """Return the signals after the first, and the seeds of their phases; all have the lines of the first.
+
+    Random phases take the next run, optimized ones the next seed, since a search uses several runs.
+    """
+    same = {"lines": first.lines.tolist(), "band_hz": None, "grid": "full"}
+    return [
+        (design.model_copy(update={**same, "run": design.run + m}), design.seed + m)
+        for m in range(1, realizations)
+    ]
+
+
+def _experiments(
+    design: ExcitationDesign,
+    robot: Robot,
+    signal: Multisine | PeriodicSignal,
+    realization: int,
+) -> References:
+    """Return the references of one realization."""
     wave = design.square
-    made = references(
+    return references(
         signal,
         robot.n_axes,
         directions=design.directions,
@@ -175,10 +225,8 @@ def excite(design: ExcitationDesign, robot: Robot | None = None) -> Excited:
         ),
         dc_level=design.dc_level_rad_s,
         seed=design.signal.seed,
-        run=design.signal.run,
+        run=design.signal.run + realization,
     )
-    made.design["excite"] = design.model_dump(by_alias=True, mode="json")
-    return Excited(made, signal, search, _report(design, made, robot))
 
 
 def _report(design: ExcitationDesign, made: References, robot: Robot) -> LimitReport | None:
@@ -186,14 +234,21 @@ def _report(design: ExcitationDesign, made: References, robot: Robot) -> LimitRe
         return None
     wanted = design.limits
     limits = Limits(wanted.velocity_rad_s, wanted.acceleration_rad_s2, wanted.torque_nm)
-    return check_limits(made, robot, limits, periods=wanted.periods, model=wanted.model)
+    return check_limits(
+        made,
+        robot,
+        limits,
+        periods=wanted.periods,
+        model=wanted.model,
+        start_rad=wanted.start_rad,
+    )
 
 
 def _signal(
-    s: SignalDesign, sample_time_s: float
+    s: SignalDesign, sample_time_s: float, seed_of_phases: int
 ) -> tuple[Multisine | PeriodicSignal, CrestSearch | None]:
     if s.kind == "multisine":
-        made, search = _multisine(s, sample_time_s)
+        made, search = _multisine(s, sample_time_s, seed_of_phases)
         return made.scaled(peak=s.peak_rad_s), search
     if s.kind == "prbs":
         return prbs(sample_time_s, bits=s.bits, amplitude=s.peak_rad_s, hold=s.hold), None
@@ -223,7 +278,9 @@ def _signal(
     )
 
 
-def _multisine(s: SignalDesign, sample_time_s: float) -> tuple[Multisine, CrestSearch | None]:
+def _multisine(
+    s: SignalDesign, sample_time_s: float, seed_of_phases: int
+) -> tuple[Multisine, CrestSearch | None]:
     made = multisine(
         _given("period_s", s.period_s),
         sample_time_s,
@@ -238,7 +295,7 @@ def _multisine(s: SignalDesign, sample_time_s: float) -> tuple[Multisine, CrestS
     if s.phases != "optimized":
         return made, None
     search = optimize_crest_factor(
-        made, starts=s.starts, time_s=s.time_s, seed=s.seed, snow_lines=s.snow_lines
+        made, starts=s.starts, time_s=s.time_s, seed=seed_of_phases, snow_lines=s.snow_lines
     )
     return search.signal, search
 

@@ -14,6 +14,12 @@ from axisight.display.summary import summarized
 from axisight.errors import InputError
 
 _HALF_WIDTH = 10  # lines on either side that share one noise level
+_CLEAR_GAP_DB, _LEAST_ABOVE = (
+    10.0,
+    10,
+)  # a gap between levels that separates excited lines from others
+_LOWEST_DB = -60.0  # weaker lines are no part of what comes close to the excitation
+_SHAPE = "numbers of shape (n_experiments, n_periods, n_samples, n_channels)"
 
 
 @summarized
@@ -78,22 +84,13 @@ def excited_lines(signal: Real, *, floor_db: float = -40.0) -> ExcitedLines:
     Raises InputError if nothing is excited, for a floor that is not below 0 dB, and for fewer than three
     samples per period.
     """
-    what = "numbers of shape (n_experiments, n_periods, n_samples, n_channels)"
-    signal = reals("signal", signal, what, 4)
+    signal = reals("signal", signal, _SHAPE, 4)
     floor_db = number("floor_db", floor_db)
     if floor_db >= 0:
         raise InputError(f"floor_db: expected below zero, got {floor_db}")
-    n_experiments, n_periods, n_samples, n_channels = signal.shape
-    if n_samples < 3:
-        raise InputError(f"signal: expected three samples a period or more, got {n_samples}")
-    n_lines = (n_samples + 1) // 2
-    spectra = np.abs(np.fft.rfft(signal.mean(1), axis=1))[:, :n_lines]
-    spectra[:, 0] = 0.0
-    strongest = spectra.max(axis=1, keepdims=True)
-    # A channel at rest contains only rounding errors and crosstalk, which would count relative to itself.
-    overall = strongest.max()
-    active = strongest > 1e-6 * overall
-    relative = np.where(active, spectra / np.where(active, strongest, 1.0), 0.0)
+    relative = _relative(signal)
+    n_experiments, n_periods, _, n_channels = signal.shape
+    n_lines = relative.shape[1]
     found = relative > 10 ** (floor_db / 20)
     if n_periods >= 2:
         for e in range(n_experiments):
@@ -106,6 +103,35 @@ def excited_lines(signal: Real, *, floor_db: float = -40.0) -> ExcitedLines:
     others = np.append(level[~any_found], 1e-15).max()
     margin = 20 * np.log10(level[any_found].min() / max(others, 1e-15))
     return ExcitedLines(np.flatnonzero(any_found).astype(np.int64), float(margin))
+
+
+def widest_gap(signal: Real) -> float | None:
+    """Return a floor [dB] in the widest gap between the levels of lines; None without a clear gap.
+
+    ``signal`` is that of :func:`excited_lines`. A clear gap is at least 10 dB wide, with at least 10 lines above
+    it and lines below it that are within 60 dB of the strongest. Use it where distortion or noise is within
+    40 dB of the strongest line.
+    """
+    level = _relative(reals("signal", signal, _SHAPE, 4)).max(axis=(0, 2))
+    ordered = 20 * np.log10(np.sort(level[level > 10 ** (_LOWEST_DB / 20)])[::-1])
+    gaps = -np.diff(ordered)[_LEAST_ABOVE - 1 :]
+    if not gaps.size or gaps.max() < _CLEAR_GAP_DB:
+        return None
+    at = int(np.argmax(gaps)) + _LEAST_ABOVE - 1
+    return float((ordered[at] + ordered[at + 1]) / 2)
+
+
+def _relative(signal: Real) -> Real:
+    """Return the level of each line relative to the strongest of its channel, (experiment, line, channel)."""
+    n_samples = signal.shape[2]
+    if n_samples < 3:
+        raise InputError(f"signal: expected three samples a period or more, got {n_samples}")
+    spectra = np.abs(np.fft.rfft(signal.mean(1), axis=1))[:, : (n_samples + 1) // 2]
+    spectra[:, 0] = 0.0
+    strongest = spectra.max(axis=1, keepdims=True)
+    # A channel at rest contains only rounding errors and crosstalk, which would count relative to itself.
+    active = strongest > 1e-6 * strongest.max()
+    return np.asarray(np.where(active, spectra / np.where(active, strongest, 1.0), 0.0))
 
 
 def _rounding(power: Real) -> float:

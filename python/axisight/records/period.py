@@ -10,7 +10,7 @@ import scipy
 
 from axisight.arguments import Real, reals
 from axisight.display.summary import summarized
-from axisight.errors import InputError
+from axisight.errors import InputError, NotPeriodicError
 from axisight.records.lines import repeating_lines
 
 _LEAST_REPETITION = 0.5  # as much noise as signal
@@ -68,8 +68,8 @@ def find_period(signal: Real) -> Period:
 
     The signal must not drift: use a reference or a torque, not a position.
 
-    Raises InputError if the signal is constant, does not repeat (autocorrelation below 0.5), or
-    repeats after a number of samples that is not whole.
+    Raises NotPeriodicError if the signal does not repeat (autocorrelation below 0.5), and InputError if it
+    is constant or repeats after a number of samples that is not whole.
     """
     signal = reals("signal", signal, "numbers of shape (n,) or (n, channels)", (1, 2))
     x = np.atleast_2d(signal.T)
@@ -89,7 +89,7 @@ def find_period(signal: Real) -> Period:
 
 
 def _good_lags(rho: Real) -> list[int]:
-    """Return the lags, ascending, with nearly the best autocorrelation; raise InputError below 0.5."""
+    """Return the lags, ascending, with nearly the best autocorrelation; raise NotPeriodicError below 0.5."""
     longest = len(rho) // 2
     reach = rho[: longest + 2]
     negative = np.flatnonzero(reach < 0)
@@ -101,7 +101,7 @@ def _good_lags(rho: Real) -> list[int]:
     heights = mid - np.clip((left - right) ** 2 / (8 * bend), -0.5, 0)
     best = float(heights.max()) if peaks.size else 0.0
     if best < _LEAST_REPETITION:
-        raise InputError(
+        raise NotPeriodicError(
             "signal: expected at least two periods, got none that repeats: the best "
             f"autocorrelation is {best:.2f}, below {_LEAST_REPETITION}; record more periods or "
             "give period_s"

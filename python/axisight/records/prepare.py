@@ -29,7 +29,7 @@ from axisight.records.delays import Delay, advance, reference_delays
 from axisight.records.drift import drift_per_period, remove_drift
 from axisight.records.experiment import Experiment, experiment_of_log
 from axisight.records.findings import FindingKind, RecordFinding
-from axisight.records.lines import excited_lines
+from axisight.records.lines import excited_lines, widest_gap
 from axisight.records.period import Period, find_period, not_whole
 from axisight.records.periodic import PeriodicRecords
 
@@ -311,7 +311,11 @@ def _excited(cut: list[Signals], lines: Lines | None, findings: list[RecordFindi
     if lines is not None:
         return lines
     source = "reference" if "reference" in cut[0] else "input"
-    found = excited_lines(_equal(cut)[source])
+    signal = _equal(cut)[source]
+    found = excited_lines(signal)
+    if found.margin_db < _CLEAR_MARGIN_DB and (floor := widest_gap(signal)) is not None:
+        # Distortion and noise repeat or come close; a gap in the levels separates them from the excitation.
+        found = excited_lines(signal, floor_db=floor)
     unsure = found.margin_db < _CLEAR_MARGIN_DB
     message = (
         f"{len(found.lines)} excited lines, {found.lines[0]} to {found.lines[-1]}, found from the "

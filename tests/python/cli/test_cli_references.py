@@ -75,6 +75,6 @@ def test_a_log_has_no_experiments(tmp_path: Path):
     again = ["simulate", "irb6600_like", out, "--experiment", "1"]
     result = CliRunner().invoke(app, [*again, "--out", str(tmp_path / "again.parquet")])
     assert result.exit_code == 2
-    assert "--experiment, --periods: expected references, got the log" in " ".join(
+    assert "--experiment, --each, --periods: expected references, got the log" in " ".join(
         result.output.split()
     )

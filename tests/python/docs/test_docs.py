@@ -30,6 +30,7 @@ MODULES = (
     axisight.mujoco,
     axisight.paths,
     axisight.records,
+    axisight.responses,
     axisight.rigid_body,
     axisight.robot_file,
     axisight.robot_export,

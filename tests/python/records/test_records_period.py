@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from axisight.errors import InputError
 from axisight.records import excited_lines, find_period, repeating_lines
+from axisight.records.lines import widest_gap
 from records_data import multisine
 
 
@@ -125,3 +126,19 @@ def test_seven_sines_in_a_window_are_one_period():
     x = np.tile(np.sin(2 * np.pi * 7 * np.arange(2500) / 2500), 4)
     assert find_period(x).n_samples == 2500
     assert find_period(noisy(x, 0.05, 0)).n_samples in (2500, 357 * 7 + 1)
+
+
+def test_a_gap_in_the_levels_separates_lines_from_distortion():
+    """Distortion within 40 dB of the excitation repeats as well; nothing below 10 dB or 10 lines is a gap."""
+    n, lines = 1000, np.arange(10, 60)
+    weaker = sum(
+        multisine(n, [k], seed=k, amplitude=0.1 * 0.98 ** (k - 60)) for k in range(60, 400)
+    )
+    signal = np.tile(multisine(n, lines) + weaker, (1, 4, 1))[..., None]
+    assert excited_lines(signal).margin_db < 1  # those above -40 dB count
+    assert widest_gap(signal) == pytest.approx(-10, abs=0.1)
+    np.testing.assert_array_equal(excited_lines(signal, floor_db=-10).lines, lines)
+    falling = sum(multisine(n, [k], seed=k, amplitude=0.9**k) for k in range(1, 80))
+    assert widest_gap(np.tile(falling, (1, 4, 1))[..., None]) is None
+    few = multisine(n, [20, 30]) + weaker
+    assert widest_gap(np.tile(few, (1, 4, 1))[..., None]) is None
