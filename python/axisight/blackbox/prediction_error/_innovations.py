@@ -108,9 +108,7 @@ class Layout:
             for j in range(n):
                 t = np.zeros((n, n))
                 t[i, j] = 1.0
-                change = Matrices(
-                    t @ x.a - x.a @ t, t @ x.b, -x.c @ t, np.zeros_like(x.d), t @ x.k
-                )
+                change = Matrices(t @ x.a - x.a @ t, t @ x.b, -x.c @ t, np.zeros_like(x.d), t @ x.k)
                 tangent.append(self.vector(change))
         q, _ = np.linalg.qr(np.stack(tangent, axis=1), mode="complete")
         return np.asarray(q[:, n * n :])
@@ -200,7 +198,7 @@ class InnovationsProblem:
         n = self.layout.n
         drive = s[:, None, None] * np.eye(n)
         found = states(x.predictor, drive, np.zeros((n, n)))[:-1]
-        return np.einsum("ij,tjr->tir", x.c, found)
+        return np.asarray(np.einsum("ij,tjr->tir", x.c, found), np.float64)
 
     @staticmethod
     def _seen(responses: list[Real], k: Real) -> Real:

@@ -177,9 +177,7 @@ class RowProblem:
         for j in np.flatnonzero(self.orders.nb):
             through = _filter(one, p.f[j], _filter(p.d, p.c, u[:, j]))
             base["B", int(j)] = -through
-            base["F", int(j)] = _filter(p.b[j], p.f[j], through) - _filter(
-                one, p.f[j], s.transient
-            )
+            base["F", int(j)] = _filter(p.b[j], p.f[j], through) - _filter(one, p.f[j], s.transient)
         columns = [delayed(base[kind, j], lag, n) for kind, j, lag in self.orders.owners()]
         return np.stack(columns, axis=1) if columns else np.zeros((n, 0))
 

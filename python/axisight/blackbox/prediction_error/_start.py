@@ -2,8 +2,9 @@
 
 A long ARX model is unbiased in open and closed loop. Its errors stand for the unknown e, so ARMAX
 coefficients follow by regression (Hannan and Rissanen, 1982); its pulse responses give B / F by the
-start of an output-error model. C and D follow the same way from what the plant leaves. The candidate
-with the least loss wins.
+start of an output-error model. With one input that start also runs on data filtered by the long A, which
+makes their noise white. C and D follow the same way from what the plant leaves. A Box-Jenkins loss has
+local minima, so the search begins from several of these candidates.
 """
 
 from __future__ import annotations
@@ -30,25 +31,36 @@ LONG_ORDERS = (10, 30, 60)
 PULSE_SAMPLES = 1000
 """Samples of their pulse responses."""
 
+SEARCHES = 3
+"""Most starts of one search; more do not find lower losses."""
+
 Coefficients = dict[tuple[str, int], Real]
 """Coefficients by polynomial and channel, from the first free lag on."""
 
 
-def starts_of(problem: RowProblem) -> Real:
-    """Return the parameters of the best start; raises InputError if no candidate has a stable predictor."""
-    best, least = None, np.inf
+def starts_of(problem: RowProblem) -> list[Real]:
+    """Return the best starts, the best first: at most `SEARCHES`, and one if the loss is quadratic.
+
+    Raises InputError if no candidate has a stable predictor.
+    """
+    found: list[tuple[float, Real]] = []
     for plant in _plants(problem):
+        best: tuple[float, Real] | None = None
         for noise in _noises(problem, plant):
             theta = _vector(problem.orders, {**plant, **noise})
             loss = problem.loss(theta)
-            if loss < least:
-                best, least = theta, loss
-    if best is None:
+            if np.isfinite(loss) and (best is None or loss < best[0]):
+                best = loss, theta
+        if best is not None:
+            found.append(best)
+    found.sort(key=lambda one: one[0])
+    if not found:
         raise InputError(
             f"experiments: output {problem.orders.output + 1} has no model with a stable predictor "
             "to start from: lower nf for a plant that integrates, or record more samples"
         )
-    return best
+    linear = problem.orders.nc + problem.orders.nd + problem.orders.nf.sum() == 0
+    return [theta for _, theta in found[: 1 if linear else SEARCHES]]
 
 
 def _vector(orders: RowOrders, found: Coefficients) -> Real:
@@ -75,14 +87,15 @@ def _plants(problem: RowProblem) -> Iterator[Coefficients]:
         if not orders.nf.any():
             yield _regressed(problem, _long_errors(problem, length))
             continue
-        pulses = _from_pulses(problem, length)
-        if pulses is not None:
-            yield pulses
+        theta = _long_arx(problem, length)
+        parts = [_from_pulses(problem, theta, length)]
+        if len(orders.nb) == 1:
+            parts.append(_from_filtered(problem, np.r_[1.0, theta[:length]]))
+        yield from (_plant(orders, part) for part in parts if part is not None)
     if len(orders.nb) == 1 and orders.nf.any():
-        own = OutputErrorProblem(orders.nb, orders.nf, orders.nk, problem.inputs, _own(problem), 0)
-        theta = refitted(own)
-        if theta is not None:
-            yield _plant(orders, [theta])
+        part = _from_filtered(problem, np.ones(1))
+        if part is not None:
+            yield _plant(orders, part)
 
 
 def _own(problem: RowProblem) -> list[Real]:
@@ -122,9 +135,28 @@ def _long_arx(problem: RowProblem, length: int) -> Real:
     )
 
 
-def _from_pulses(problem: RowProblem, length: int) -> Coefficients | None:
+def _from_filtered(problem: RowProblem, whitening: Real) -> list[Real] | None:
+    """Return B and F of one input by refits to data that a filter makes white."""
     orders = problem.orders
-    theta = _long_arx(problem, length)
+
+    def filtered(x: Real) -> Real:
+        return np.asarray(signal.lfilter(whitening, [1.0], x, axis=0))
+
+    own = OutputErrorProblem(
+        orders.nb,
+        orders.nf,
+        orders.nk,
+        [filtered(u) for u in problem.inputs],
+        [filtered(y) for y in _own(problem)],
+        len(whitening) - 1,
+    )
+    theta = refitted(own)
+    return None if theta is None else [theta]
+
+
+def _from_pulses(problem: RowProblem, theta: Real, length: int) -> list[Real] | None:
+    """Return B and F by input from the pulse responses of a long ARX model."""
+    orders = problem.orders
     bottom = stabilized(np.r_[1.0, theta[:length]])
     pulse = np.zeros(PULSE_SAMPLES)
     pulse[0] = 1.0
@@ -141,7 +173,7 @@ def _from_pulses(problem: RowProblem, length: int) -> Coefficients | None:
         if part is None:
             return None
         parts.append(part)
-    return _plant(orders, parts)
+    return parts
 
 
 def _regressed(problem: RowProblem, errors: list[Real]) -> Coefficients:

@@ -139,7 +139,7 @@ def polynomial_model(
         ``"estimate"`` frees the unknown past of every experiment; ``"zero"`` for experiments that
         begin at rest.
     max_evaluations
-        Most evaluations of the search, for each output.
+        Most evaluations of each search; every output has up to three, from different starts.
 
     In closed loop the estimate is consistent if the model can describe plant and noise, and every
     loop has a delay: nk at least 1 if the controller acts within the sample. Standard errors hold for
@@ -176,8 +176,7 @@ def _orders(
     p, m = first.output.shape[1], first.input.shape[1]
     a = order_matrix("na", na, (p, p), 0)
     b, f, k = (
-        order_matrix(name, value, (p, m), 0)
-        for name, value in (("nb", nb), ("nf", nf), ("nk", nk))
+        order_matrix(name, value, (p, m), 0) for name, value in (("nb", nb), ("nf", nf), ("nk", nk))
     )
     c, d = (order_matrix(name, value, (1, p), 0)[0] for name, value in (("nc", nc), ("nd", nd)))
     if np.any((f > 0) & (b == 0)):
@@ -192,17 +191,21 @@ def _orders(
 
 
 def _searched(problem: RowProblem, limit: int) -> _Row:
-    result = optimize.least_squares(
-        problem.residual,
-        starts_of(problem),
-        problem.jacobian,
-        method="trf",
-        x_scale="jac",
-        xtol=1e-12,
-        ftol=1e-14,
-        gtol=1e-14,
-        max_nfev=limit,
-    )
+    results = [
+        optimize.least_squares(
+            problem.residual,
+            start,
+            problem.jacobian,
+            method="trf",
+            x_scale="jac",
+            xtol=1e-12,
+            ftol=1e-14,
+            gtol=1e-14,
+            max_nfev=limit,
+        )
+        for start in starts_of(problem)
+    ]
+    result = min(results, key=lambda found: float(found.cost))
     theta = np.asarray(result.x, np.float64)
     residual, jacobian = problem.residual(theta), problem.jacobian(theta)
     root = inverse_root(jacobian, len(residual) * np.finfo(float).eps)
@@ -211,7 +214,7 @@ def _searched(problem: RowProblem, limit: int) -> _Row:
         problem,
         theta,
         status if root is not None else "rank_deficient",
-        int(result.nfev),
+        sum(int(found.nfev) for found in results),
         residual,
         jacobian,
         root,

@@ -28,6 +28,9 @@ ROUNDS = 12
 SETTLED = 1e-6
 """Relative change of the loss at which the weights have settled."""
 
+NEAR_CIRCLE = 1e-3
+"""Poles of the predictor this near the unit circle are reported."""
+
 LEAST_NOISE = 1e-7
 """Errors of an output below this share of its size count as this share, so that weights stay finite."""
 
@@ -117,7 +120,7 @@ class InnovationsModel:
         slope = np.concatenate(parts, axis=3)
         missing = len(self.covariance) - slope.shape[3]
         slope = np.concatenate([slope, np.zeros((len(z), p, m, missing))], axis=3)
-        return left @ x.b + x.d, slope
+        return np.asarray(left @ x.b + x.d), np.asarray(slope, np.complex128)
 
     def noise_response(self, frequency_hz: ArrayLike) -> Complex:
         """Return the noise model H (3.29) at e^{iwT}, (n_freq, p, p), for frequencies [Hz]."""
@@ -139,14 +142,7 @@ class InnovationsModel:
         x = self.model
         p, m = x.d.shape
         expect_experiment(experiment, m, p, x.sample_time_s)
-        problem = InnovationsProblem(
-            Layout(x.order, m, p, self.direct, self.noise == "estimate"),
-            [experiment.input],
-            [experiment.output],
-            _weight(x.noise_covariance),
-            True,
-        )
-        return np.asarray(experiment.output - problem.errors(Matrices(x.a, x.b, x.c, x.d, x.k))[0])
+        return np.asarray(experiment.output - self.problem([experiment]).errors(self.matrices)[0])
 
     def residual_tests(
         self, experiment: Experiment, *, lags: int = 25, probability: float = 0.99
@@ -169,6 +165,23 @@ class InnovationsModel:
     def to_state_space(self) -> StateSpaceModel:
         """Return ``model``."""
         return self.model
+
+    def problem(self, experiments: Sequence[Experiment]) -> InnovationsProblem:
+        """Return the search problem on ``experiments``, weighted by the noise of the model."""
+        p, m = self.model.d.shape
+        return InnovationsProblem(
+            Layout(self.model.order, m, p, self.direct, self.noise == "estimate"),
+            [e.input for e in experiments],
+            [e.output for e in experiments],
+            _weight(self.model.noise_covariance),
+            True,
+        )
+
+    @property
+    def matrices(self) -> Matrices:
+        """The matrices of ``model``."""
+        x = self.model
+        return Matrices(x.a, x.b, x.c, x.d, x.k)
 
 
 def state_space_pem(
@@ -236,7 +249,8 @@ def state_space_pem(
             f"experiments: expected more than {n * (m + 2 * p) + p * m} measured values for order "
             f"{n}, got {problem.n_values}"
         )
-    begun = _stabilized(_scaled(start, *scales), start.noise_covariance / np.outer(scales[1], scales[1]), layout)
+    noise_power = start.noise_covariance / np.outer(scales[1], scales[1])
+    begun = _stabilized(_scaled(start, *scales), noise_power, layout)
     return _fitted(problem, begun, limit, scales, data[0].sample_time_s)
 
 
@@ -248,6 +262,11 @@ def _scale(signals: list[Real]) -> Real:
 def _scaled(x: StateSpaceModel, u: Real, y: Real) -> Matrices:
     """Return the matrices for inputs divided by ``u`` and outputs divided by ``y``."""
     return Matrices(x.a, x.b * u, x.c / y[:, None], x.d * u / y[:, None], x.k * y)
+
+
+def _unscaled(x: Matrices, u: Real, y: Real) -> Matrices:
+    """Return the inverse of `_scaled`."""
+    return Matrices(x.a, x.b / u, x.c * y[:, None], x.d / u * y[:, None], x.k / y)
 
 
 def _stabilized(x: Matrices, noise: Real, layout: Layout) -> Matrices:
@@ -306,23 +325,7 @@ def _search(problem: InnovationsProblem, x: Matrices, limit: int) -> _Found:
         problem = replace(problem, weight=_weight(noise))
         theta, ways = problem.layout.vector(x), problem.layout.directions(x)
 
-        def residual(step: Real, at=problem, theta=theta, ways=ways) -> Real:
-            return at.residual(theta + ways @ step)
-
-        def slope(step: Real, at=problem, theta=theta, ways=ways) -> Real:
-            return np.asarray(at.jacobian(theta + ways @ step) @ ways)
-
-        result = optimize.least_squares(
-            residual,
-            np.zeros(ways.shape[1]),
-            slope,
-            method="trf",
-            x_scale="jac",
-            xtol=1e-10,
-            ftol=1e-12,
-            gtol=1e-12,
-            max_nfev=max(limit - used, 1),
-        )
+        result = _local_search(problem, theta, ways, max(limit - used, 1))
         used += int(result.nfev)
         x = problem.layout.matrices(theta + ways @ result.x)
         loss = float(np.linalg.slogdet(_noise(problem, x))[1])
@@ -333,17 +336,38 @@ def _search(problem: InnovationsProblem, x: Matrices, limit: int) -> _Found:
     return _Found(x, problem, used, settled)
 
 
+def _local_search(
+    problem: InnovationsProblem, theta: Real, ways: Real, limit: int
+) -> optimize.OptimizeResult:
+    """Return the search from ``theta`` in the directions that change the model."""
+
+    def residual(step: Real) -> Real:
+        return problem.residual(theta + ways @ step)
+
+    def slope(step: Real) -> Real:
+        return np.asarray(problem.jacobian(theta + ways @ step) @ ways)
+
+    return optimize.least_squares(
+        residual,
+        np.zeros(ways.shape[1]),
+        slope,
+        method="trf",
+        x_scale="jac",
+        xtol=1e-10,
+        ftol=1e-12,
+        gtol=1e-12,
+        max_nfev=limit,
+    )
+
+
 def _fitted(
     problem: InnovationsProblem, x: Matrices, limit: int, scales: list[Real], step: float
 ) -> InnovationsModel:
     found = _search(problem, x, limit)
     x, problem, layout = found.x, found.problem, found.problem.layout
     ways = layout.directions(x)
-    n_samples = sum(map(len, problem.outputs))
-    lost = (ways.shape[1] + problem.n_values * 0.0) / layout.p
-    if problem.transients:
-        lost += len(problem.outputs) * layout.n / layout.p
-    noise = _noise(problem, x, lost)
+    firsts = len(problem.outputs) * layout.n if problem.transients else 0
+    noise = _noise(problem, x, (ways.shape[1] + firsts) / layout.p)
     problem = replace(problem, weight=_weight(noise))
     slope = problem.jacobian(layout.vector(x)) @ ways
     root = inverse_root(slope, len(slope) * np.finfo(float).eps)
@@ -355,23 +379,19 @@ def _fitted(
         covariance = np.full((len(ways), len(ways)), np.nan)
     else:
         covariance = ways @ root @ (ways @ root).T
+    if np.any(np.abs(np.linalg.eigvals(x.predictor)) > 1 - NEAR_CIRCLE):
+        warnings.append(
+            "a zero of the noise model is at the unit circle, so standard errors do not hold: remove "
+            "offsets and drift, or do not difference the output"
+        )
     if status == "max_evaluations":
         warnings.append("stopped at the limit; allow more evaluations, or lower the order")
     u, y = scales
-    # Entries scale back as the matrices do.
-    back = layout.vector(
-        Matrices(
-            np.ones_like(x.a),
-            np.ones_like(x.b) / u,
-            np.ones_like(x.c) * y[:, None],
-            y[:, None] / np.broadcast_to(u, x.d.shape),
-            np.ones_like(x.k) / y,
-        )
-    )
-    own = noise * np.outer(y, y)
-    model = StateSpaceModel(
-        step, x.a, x.b / u, x.c * y[:, None], x.d / u * y[:, None], x.k / y, own
-    )
+    ones = Matrices(*(np.ones_like(v) for v in (x.a, x.b, x.c, x.d, x.k)))
+    back = layout.vector(_unscaled(ones, u, y))
+    own = _unscaled(x, u, y)
+    power = np.outer(y, y)
+    model = StateSpaceModel(step, own.a, own.b, own.c, own.d, own.k, noise * power)
     if not model.stable:
         warnings.append(f"unstable: largest pole {np.max(np.abs(model.poles)):.4f}")
     return InnovationsModel(
@@ -379,9 +399,9 @@ def _fitted(
         covariance=np.asarray(covariance * np.outer(back, back)),
         direct=layout.direct,
         noise="estimate" if layout.noise else "none",
-        loss=float(np.linalg.det(_noise(problem, x) * np.outer(y, y))),
+        loss=float(np.linalg.det(_noise(problem, x) * power)),
         status=status,
         evaluations=found.evaluations,
-        n_rows=n_samples,
+        n_rows=sum(map(len, problem.outputs)),
         warnings=tuple(warnings),
     )
