@@ -22,6 +22,12 @@ from axisight.errors import InputError
 ROUNDS = 50
 """Most refits of the start of a limiting model."""
 
+DRAWN_POLES = 200
+"""Sets of poles from which a search for a limiting model may begin."""
+
+SEARCHES = 5
+"""Starts of least loss that are searched."""
+
 
 def input_spectra(
     response: ArrayLike,
@@ -255,7 +261,7 @@ def limiting_model(
     sample_time_s
         Sample time T [s].
     max_evaluations
-        Most evaluations of the search.
+        Most evaluations of each of the searches, which begin from several poles.
 
     Raises InputError for other shapes and orders; non-convergence is a status.
     """
@@ -283,17 +289,21 @@ def limiting_model(
         below = (size / (1 + bottom @ theta[n_b:]))[:, None]
         return _parts(np.hstack([top, -bottom * response(theta)[:, None]]) * below)
 
-    start = _refits(goal, size, top, bottom, residual)
-    found = optimize.least_squares(
-        residual,
-        start,
-        slope,
-        x_scale="jac",
-        xtol=1e-12,
-        ftol=1e-14,
-        gtol=1e-14,
-        max_nfev=whole("max_evaluations", max_evaluations, 1),
-    )
+    limit = whole("max_evaluations", max_evaluations, 1)
+    searches = [
+        optimize.least_squares(
+            residual,
+            start,
+            slope,
+            x_scale="jac",
+            xtol=1e-12,
+            ftol=1e-14,
+            gtol=1e-14,
+            max_nfev=limit,
+        )
+        for start in _limit_starts(goal, size, top, bottom, residual)
+    ]
+    found = min(searches, key=lambda one: float(one.cost))
     theta = np.asarray(found.x, np.float64)
     return LimitingModel(
         np.r_[np.zeros(delay), theta[:n_b]],
@@ -301,6 +311,27 @@ def limiting_model(
         response(theta),
         "max_evaluations" if found.status == 0 else "converged",
     )
+
+
+def _limit_starts(
+    goal: Complex, size: Real, top: Complex, bottom: Complex, residual: Callable[[Real], Real]
+) -> list[Real]:
+    """Return starts of the search: the loss has local minima, so poles are drawn all over the circle."""
+    n_f = bottom.shape[1]
+    rng = np.random.default_rng(0)
+    starts = [_refits(goal, size, top, bottom, residual)]
+    for _ in range(DRAWN_POLES if n_f else 0):
+        radius, angle = rng.uniform(0.2, 0.99, (n_f,)), rng.uniform(0, np.pi, (n_f,))
+        poles = radius[: n_f // 2] * np.exp(1j * angle[: n_f // 2])
+        real = radius[n_f // 2 : n_f - n_f // 2] if n_f % 2 else np.zeros(0)
+        own: Complex = np.asarray(np.poly(np.r_[poles, poles.conj(), real]), np.complex128)
+        f = np.asarray(own.real[1:], np.float64)
+        weight = size / np.abs(1 + bottom @ f)
+        matrix = _parts(np.asarray(top * weight[:, None], np.complex128))
+        b = np.linalg.lstsq(matrix, _parts(goal * size), rcond=None)[0]
+        starts.append(np.r_[np.asarray(b, np.float64), f])
+    starts.sort(key=lambda theta: float(np.sum(residual(theta) ** 2)))
+    return starts[:SEARCHES]
 
 
 def _refits(
