@@ -88,6 +88,9 @@ class Statements:
 
 # Importing a module registers its items.
 _MODULES: tuple[str, ...] = (
+    "chapter3_claims",
+    "chapter5_transients",
+    "chapter5_claims",
     "chapter7_periods",
     "chapter7_signals",
     "chapter7_averages",

@@ -19,11 +19,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
-from scipy import linalg, optimize, signal
+from scipy import linalg, optimize
 
 from axisight.blackbox._data import (
     Complex,
-    Integers,
     Real,
     gathered,
     lines,
@@ -34,24 +33,12 @@ from axisight.blackbox._data import (
     whole,
 )
 from axisight.blackbox._model import StateSpaceModel
+from axisight.blackbox._output_error_problem import OutputErrorProblem, start_of
 from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.frf.response import frequency_response
 from axisight.records.experiment import Experiment
-from axisight.statistics.least_squares import inverse_root, scaled_solution
-
-START_ROUNDS = 20
-"""Refits of the start; more do not improve it."""
-
-LONG_ORDERS = (30, 60)
-"""Further ARX orders to start from if there are several inputs. Only a long ARX model comes near white
-noise on the output."""
-
-EXACT = 1e-12
-"""Singular values below this share of the largest are rounding."""
-
-PULSE_SAMPLES = 4000
-"""Samples of the pulse responses to start from if there are several inputs."""
+from axisight.statistics.least_squares import inverse_root
 
 
 @summarized
@@ -167,61 +154,6 @@ class OutputErrorModel:
         )
 
 
-@dataclass(frozen=True)
-class _Problem:
-    """The problem of one output: orders by input, experiments, and samples left out of each."""
-
-    nb: Integers
-    nf: Integers
-    nk: Integers
-    inputs: list[Real]
-    outputs: list[Real]
-    skip: int
-
-    @property
-    def n_inputs(self) -> int:
-        return len(self.nb)
-
-    def split(self, theta: Real) -> tuple[list[Real], list[Real]]:
-        """Return polynomials B with delays, and F with leading one."""
-        b, f, place = [], [], 0
-        for j in range(self.n_inputs):
-            b.append(np.concatenate([np.zeros(self.nk[j]), theta[place : place + self.nb[j]]]))
-            place += int(self.nb[j])
-            f.append(np.concatenate([[1.0], theta[place : place + self.nf[j]]]))
-            place += int(self.nf[j])
-        return b, f
-
-    def stable(self, theta: Real) -> bool:
-        return all(np.all(np.abs(np.roots(f)) < 1) for f in self.split(theta)[1])
-
-    def residual(self, theta: Real) -> Real:
-        """Return model minus measurement, NaN where F is unstable."""
-        rows = sum(len(y) - self.skip for y in self.outputs)
-        if not self.stable(theta):
-            return np.full(rows, np.nan)
-        b, f = self.split(theta)
-        out = []
-        for u, y in zip(self.inputs, self.outputs, strict=True):
-            model = sum(signal.lfilter(b[j], f[j], u[:, j]) for j in range(self.n_inputs))
-            out.append((model - y)[self.skip :])
-        return np.concatenate(out)
-
-    def jacobian(self, theta: Real) -> Real:
-        """Return the exact derivative of `residual`."""
-        b, f = self.split(theta)
-        out = []
-        for u in self.inputs:
-            n, columns = len(u), []
-            for j in range(self.n_inputs):
-                w = signal.lfilter([1.0], f[j], u[:, j])
-                s = signal.lfilter(b[j], f[j], w)
-                columns += [_delayed(w, int(self.nk[j]) + k, n) for k in range(self.nb[j])]
-                columns += [-_delayed(s, k + 1, n) for k in range(self.nf[j])]
-            out.append(np.stack(columns, axis=1)[self.skip :])
-        return np.concatenate(out)
-
-
 def output_error(
     experiments: Experiment | Sequence[Experiment],
     *,
@@ -271,7 +203,7 @@ def output_error(
         )
     found = []
     for i in range(p):
-        problem = _Problem(
+        problem = OutputErrorProblem(
             orders_b[i],
             orders_f[i],
             delays[i],
@@ -283,11 +215,11 @@ def output_error(
     return _model(found, data[0].sample_time_s, rows)
 
 
-def _searched(problem: _Problem, limit: int, output: int) -> tuple[Real, str, int]:
-    start = _start(problem, output)
+def _searched(problem: OutputErrorProblem, limit: int, output: int) -> tuple[Real, str, int]:
+    first = start_of(problem, output)
     result = optimize.least_squares(
         problem.residual,
-        start,
+        first,
         problem.jacobian,
         method="trf",
         x_scale="jac",
@@ -300,117 +232,8 @@ def _searched(problem: _Problem, limit: int, output: int) -> tuple[Real, str, in
     return np.asarray(result.x), status, int(result.nfev)
 
 
-def _start(problem: _Problem, output: int) -> Real:
-    """Return the stable start of least loss: from refits, or from pulse responses for several inputs."""
-    candidates = []
-    if problem.n_inputs == 1:
-        candidates.append([_refitted(problem)])
-    else:
-        rows = sum(len(y) - problem.skip for y in problem.outputs)
-        least = int(problem.nf.sum())
-        for order in sorted({least, 2 * least + 2, *LONG_ORDERS}):
-            if least <= order <= rows // (4 * (problem.n_inputs + 1)):
-                candidates.append([_refitted(part) for part in _pulses(problem, order)])
-    best: tuple[float, Real] | None = None
-    for parts in candidates:
-        if all(part is not None for part in parts):
-            theta = np.concatenate([part for part in parts if part is not None])
-            loss = float(np.sum(problem.residual(theta) ** 2))
-            if np.isfinite(loss) and (best is None or loss < best[0]):
-                best = loss, theta
-    if best is None:
-        raise InputError(
-            f"experiments: output {output + 1} has no stable output-error model of this order to "
-            "start from: it may integrate (fit its velocity), be unstable, or too short"
-        )
-    return best[1]
-
-
-def _refitted(problem: _Problem) -> Real | None:
-    """Return the best of an ARX model and its refits to filtered data, for one input."""
-    best: tuple[float, Real] | None = None
-    bottom = np.ones(1)
-    for _ in range(START_ROUNDS):
-        x, y = (_filtered(s, bottom) for s in ([u[:, 0] for u in problem.inputs], problem.outputs))
-        theta = _equation_error(problem, x, y)
-        b, f = problem.split(theta)
-        following = _stabilized(f[0])
-        theta = np.concatenate([b[0][problem.nk[0] :], following[1:]])
-        loss = float(np.sum(problem.residual(theta) ** 2))
-        if np.isfinite(loss) and (best is None or loss < best[0]):
-            best = loss, theta
-        if len(bottom) == len(following) and np.allclose(bottom, following, rtol=0, atol=1e-9):
-            break
-        bottom = following
-    return None if best is None else best[1]
-
-
-def _filtered(signals: list[Real], bottom: Real) -> list[Real]:
-    return [np.asarray(signal.lfilter([1.0], bottom, x)) for x in signals]
-
-
-def _equation_error(problem: _Problem, inputs: list[Real], outputs: list[Real]) -> Real:
-    """Return the least-squares solution of F y = B u for one input."""
-    nb, nf, nk = int(problem.nb[0]), int(problem.nf[0]), int(problem.nk[0])
-    rows = []
-    for x, y in zip(inputs, outputs, strict=True):
-        columns = [_delayed(x, nk + k, len(x)) for k in range(nb)]
-        columns += [-_delayed(y, k + 1, len(x)) for k in range(nf)]
-        rows.append(np.stack(columns, axis=1)[problem.skip :])
-    return _least_squares(
-        np.concatenate(rows), np.concatenate([y[problem.skip :] for y in outputs])
-    )
-
-
-def _least_squares(matrix: Real, target: Real) -> Real:
-    # The triangle has the singular values of the tall matrix, at a tenth of the cost.
-    (r,) = linalg.qr(np.column_stack([matrix, target]), mode="r", check_finite=False)
-    width = matrix.shape[1]
-    triangle = np.asarray(r[: width + 1], np.float64)
-    return scaled_solution(triangle[:, :width], triangle[:, width], EXACT)
-
-
-def _pulses(problem: _Problem, order: int) -> list[_Problem]:
-    """Return one problem per input, whose data are the pulse response of an ARX model of ``order``."""
-    reach = int((problem.nk + problem.nb).max()) + order
-    rows = []
-    for u, y in zip(problem.inputs, problem.outputs, strict=True):
-        columns = [-_delayed(y, k + 1, len(y)) for k in range(order)]
-        columns += [_delayed(x, k, len(y)) for x in u.T for k in range(reach)]
-        rows.append(np.stack(columns, axis=1)[problem.skip :])
-    target = np.concatenate([y[problem.skip :] for y in problem.outputs])
-    theta = _least_squares(np.concatenate(rows), target)
-    bottom = _stabilized(np.concatenate([[1.0], theta[:order]]))
-    length = min(PULSE_SAMPLES, max(len(y) for y in problem.outputs))
-    pulse = np.zeros(length)
-    pulse[0] = 1.0
-    parts = []
-    for j in range(problem.n_inputs):
-        top = theta[order + j * reach : order + (j + 1) * reach]
-        response = np.asarray(signal.lfilter(top, bottom, pulse))
-        one = slice(j, j + 1)
-        parts.append(
-            _Problem(
-                problem.nb[one], problem.nf[one], problem.nk[one], [pulse[:, None]], [response], 0
-            )
-        )
-    return parts
-
-
-def _stabilized(polynomial: Real) -> Real:
-    """Return the polynomial with its roots beyond 0.999 reflected to within 0.999."""
-    roots = np.roots(polynomial)
-    size = np.abs(roots)
-    far = size > 0.999
-    if not far.any():
-        return polynomial
-    roots[far] /= np.maximum(size[far] ** 2, size[far] / 0.999)
-    inside = np.real(np.atleast_1d(np.poly(roots)))
-    return np.pad(inside, (0, len(polynomial) - len(inside)))
-
-
 def _model(
-    found: list[tuple[_Problem, Real, str, int]], sample_time_s: float, rows: int
+    found: list[tuple[OutputErrorProblem, Real, str, int]], sample_time_s: float, rows: int
 ) -> OutputErrorModel:
     names: list[str] = []
     owners: list[tuple[int, str, int, int]] = []
@@ -457,10 +280,3 @@ def _model(
         warnings=tuple(warnings),
         owners=tuple(owners),
     )
-
-
-def _delayed(x: Real, lag: int, n: int) -> Real:
-    out = np.zeros(n)
-    if lag < n:
-        out[lag:] = x[: n - lag]
-    return out

@@ -32,7 +32,7 @@ class ResidualTests:
     (n_out, n_in, 2 lags + 1), lags from -lags to lags, are normalized. ``whiteness_p`` (n_out,)
     and ``independence_p`` (n_out, n_in) are p-values: the probability of at least this much
     correlation by chance. Below 1 - ``probability`` the test fails. The test of independence uses
-    lags from 0 on; correlation at negative lags shows feedback. With ``probability``, a single lag
+    lags from ``first_lag`` on; correlation at negative lags shows feedback. With ``probability``, a single lag
     stays within ``autocorrelation_bound`` and ``cross_correlation_bound`` (n_out, n_in).
     """
 
@@ -98,6 +98,7 @@ def residual_tests(
     *,
     lags: int = 25,
     probability: float = 0.99,
+    first_lag: int = 0,
 ) -> ResidualTests:
     """Return tests of residuals ``measurement - model`` of one experiment.
 
@@ -109,10 +110,13 @@ def residual_tests(
         Largest lag.
     probability
         Probability that a right model passes.
+    first_lag
+        First lag of the test of independence. Take 1 if a controller acts within its sample: the input
+        then follows the residual of the same sample, whatever the model.
 
     Whiteness: Ljung and Box's sum of squared autocorrelations, chi-squared with ``lags``
     degrees of freedom (estimated parameters take a few off, which makes the test mild).
-    Independence: the vector of cross-correlations at lags 0 to ``lags`` against its covariance
+    Independence: the vector of cross-correlations at lags ``first_lag`` to ``lags`` against its covariance
     sum_k R_e(k) R_u(k + i - j) / n, for a residual of any colour (Ljung, 1999, chapter 16).
 
     Raises InputError for misuse, and for a residual or input that is constant.
@@ -120,6 +124,9 @@ def residual_tests(
     if not 0 < probability < 1:
         raise InputError(f"probability: expected a number between 0 and 1, got {probability}")
     most = whole("lags", lags, 1)
+    first = whole("first_lag", first_lag, 0)
+    if first > most:
+        raise InputError(f"first_lag: expected at most {most} (lags), got {first}")
     e, u = _rows("residual", residual), _rows("input_", input_)
     if len(e) != len(u):
         raise InputError(f"input_: expected {len(e)} samples as the residual, got {len(u)}")
@@ -149,7 +156,9 @@ def residual_tests(
             size = np.sqrt(r_e[i, 0] * r_u[j, 0])
             cross[i, j] = both / size
             bound[i, j] = one_sided * np.sqrt(spread[0]) / size
-            independence[i, j] = joint_p_value(after, np.arange(most + 1), spread, LEAST_SPREAD)
+            independence[i, j] = joint_p_value(
+                after[first:], np.arange(first, most + 1), spread, LEAST_SPREAD
+            )
     return ResidualTests(
         white,
         cross,

@@ -14,7 +14,7 @@ from axisight.blackbox import (
     state_space_orders,
     subspace,
 )
-from axisight.blackbox.output_error import _Problem
+from axisight.blackbox._output_error_problem import OutputErrorProblem
 from axisight.errors import InputError
 from axisight.records.experiment import Experiment
 
@@ -42,7 +42,7 @@ def test_gradient_filters_are_the_derivative() -> None:
     """Complex steps carry no cancellation: the filters agree with them to rounding."""
     e = known.output_error_experiment(80, 0.1, 1)
     orders = (np.array([2]), np.array([2]), np.array([1]))
-    problem = _Problem(*orders, [e.input], [e.output[:, 0]], 5)
+    problem = OutputErrorProblem(*orders, [e.input], [e.output[:, 0]], 5)
     theta = np.array([0.3, 0.05, -1.5, 0.7])
     exact = problem.jacobian(theta)
     for k in range(4):

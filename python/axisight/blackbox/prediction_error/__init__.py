@@ -1,0 +1,1 @@
+"""Models with a noise model, by the prediction-error method."""
