@@ -117,7 +117,8 @@ def _straight_line(rho: Real, lag: int) -> Period:
     places: list[float] = []
     errors: list[float] = []
     slope = float(lag)
-    while not orders or (len(orders) + 1) * slope < 0.75 * n:
+    # Further than a sample from the lag, the peaks are not those of its multiples.
+    while not orders or ((len(orders) + 1) * slope < 0.75 * n and abs(slope - lag) < 1):
         m = len(orders) + 1
         middle = round(m * slope)
         reach = np.arange(max(1, middle - 2), min(n - 1, middle + 3))

@@ -1,5 +1,7 @@
 """Periods and excited lines: found where they are, refused where they are not."""
 
+import contextlib
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,6 +11,7 @@ from axisight.errors import InputError
 from axisight.records import excited_lines, find_period, repeating_lines
 from axisight.records.lines import widest_gap
 from records_data import multisine
+from response_logs import periodic_logs
 
 
 def noisy(x, level, seed):
@@ -142,3 +145,11 @@ def test_a_gap_in_the_levels_separates_lines_from_distortion():
     assert widest_gap(np.tile(falling, (1, 4, 1))[..., None]) is None
     few = multisine(n, [20, 30]) + weaker
     assert widest_gap(np.tile(few, (1, 4, 1))[..., None]) is None
+
+
+def test_a_piece_without_a_period_ends():
+    """Peaks that move away from the multiples of a lag: the straight line through them must not follow."""
+    reference = periodic_logs(realizations=2, periods=5)[0].velocity_ref_rad_s
+    piece = reference[20 * 53 : 21 * 53]
+    with contextlib.suppress(InputError):
+        assert find_period(piece).n_samples < len(piece)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -210,3 +212,15 @@ def test_still_axes_are_left_out() -> None:
     assert list(found.response["input"].values) == [1, 3]
     assert error(found) < ROUNDING
     assert found.choices[0].startswith("axes: 1, 3; without 2")
+
+
+def test_position_targets_are_a_reference_too() -> None:
+    """Their rate is the reference. The targets themselves drift, and their high lines are weak."""
+    logs = []
+    for one in periodic_logs():
+        rate = one.velocity_ref_rad_s
+        target = np.cumsum(rate, axis=0) * one.sample_time_s
+        logs.append(replace(one, velocity_ref_rad_s=None, position_ref_rad=target))
+    found = response_of_logs(logs, drop_periods=1)
+    assert found.choices[0].endswith("found from the reference")
+    assert error(found) < ROUNDING
