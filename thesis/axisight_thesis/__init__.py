@@ -1,4 +1,4 @@
-"""Wernholt (2004), chapters 7 to 9 and appendix A, on the preset robot and a stand-in for axis 1.
+"""Wernholt (2004), chapters 3, 5 and 7 to 9 and appendix A, on a preset robot and stand-ins.
 
 The thesis is "On Multivariable and Nonlinear Identification of Industrial Robots".
 Every table and figure is an item: a function from a :class:`Context` to an :class:`Item`,

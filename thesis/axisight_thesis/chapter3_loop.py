@@ -118,7 +118,7 @@ def _limited(setting: Setting, r: Real, v: Real) -> tuple[Real, Real]:
 
 def realizations(context: Context) -> int:
     """Return the number of realizations of a comparison."""
-    return 8 if context.quick else 40
+    return 8 if context.quick else 30
 
 
 def responses(

@@ -35,6 +35,29 @@ def test_black_box_page(repository: Path, tmp_path: Path) -> None:
     assert abs(mode["frequency_hz"] - 12.0) < 5 * mode["frequency_std_hz"]
 
 
+def test_black_box_page_on_noise_models(repository: Path, tmp_path: Path) -> None:
+    shown = run(repository, tmp_path, "black_box.md")
+    jenkins = shown["jenkins"]
+    true = np.array([0.2, 0.1, -1.6, 0.8, 0.5, -0.9])
+    assert jenkins.status == "converged" and jenkins.residual_tests(shown["data"]).advice() == ()
+    assert np.abs((jenkins.values - true) / jenkins.std).max() < 4
+    assert shown["space"].status == "converged"
+
+
+def test_closed_loop_methods_page(repository: Path, tmp_path: Path) -> None:
+    """Every number that the page prints is what its code computes."""
+    page = (repository / "docs" / "closed_loop_methods.md").read_text(encoding="utf-8")
+    shown = run(repository, tmp_path, "closed_loop_methods.md")
+    tables = re.findall(r"```text\n(.*?)```", page, flags=re.DOTALL)
+    frame = shown["table"].to_dataframe().round(3)
+    assert " ".join(tables[0].split()) == " ".join(str(frame).split())
+    for approach, bias in re.findall(r"^(\w+) +bias +(\d+)%", tables[1], flags=re.MULTILINE):
+        found = np.linalg.norm(shown["expected"]["bias"].sel(approach=approach)) / shown["size"]
+        assert round(100 * found) == int(bias), approach
+    assert shown["found"].controller_mismatch[0] < 1e-12
+    assert np.isfinite(shown["response"]["variance"].values).all()
+
+
 def test_identifiability_page(repository: Path, tmp_path: Path) -> None:
     shown = run(repository, tmp_path, "identifiability.md")
     words = shown["found"].words()

@@ -1,5 +1,7 @@
 """Direct, indirect and joint methods, and their expected errors: identities, oracles, recovery, misuse."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -22,7 +24,12 @@ from axisight.blackbox import (
     wrong_controller_bias,
 )
 from axisight.blackbox.closed_loop._covariance import joint_covariance
-from axisight.blackbox.prediction_error.state_space import state_space_pem
+from axisight.blackbox.closed_loop.controller import plant_of_closed_loop, plant_of_joint
+from axisight.blackbox.prediction_error.state_space import (
+    matrices_of,
+    problem_of,
+    state_space_pem,
+)
 from axisight.errors import InputError
 from axisight.frf.response import frequency_response
 from axisight.records.experiment import Experiment
@@ -125,6 +132,70 @@ def test_joint_covariance_of_one_model_is_its_own() -> None:
     )
     np.testing.assert_allclose(other, one, rtol=0.35)
     assert np.median(other / one) == pytest.approx(1.0, abs=0.15) and len(f) == 25
+
+
+def test_joint_covariance_sees_errors_of_other_samples() -> None:
+    """The second model sees the same records one sample later, so both have nearly the same error.
+
+    The taper leaves 2 (1 - 20/21) = 0.095 of the variance in the difference; without other lags it is 2.
+    """
+    x = closed.loop(3001, 3)
+    early = Experiment(1.0, x.input[1:], x.output[1:])
+    late = Experiment(1.0, x.input[:-1], x.output[:-1])
+    models = [state_space_pem(d, 3) for d in (early, late)]
+    both = joint_covariance(models, [[early], [late]])
+    slopes = [m.response_slopes(LINES)[1][:, 0, 0] for m in models]
+    apart = np.concatenate([slopes[0], -slopes[1]], axis=1)
+    difference = np.einsum("fk,kl,fl->f", apart, both, apart.conj()).real
+    own = models[0].response(LINES)["variance"].values[:, 0, 0]
+    assert np.median(difference / own) == pytest.approx(2 / 21, abs=0.1)
+
+
+def test_slopes_of_every_approach_are_derivatives() -> None:
+    """Central differences along random changes of all matrices of the fitted models."""
+    x, controller, _ = matrix_loop(800, 0.1, 4)
+    found = identify_closed_loop(x, 3, controller=controller)
+    rng = np.random.default_rng(1)
+    for name, estimate in found.estimates.items():
+        ways = [rng.normal(size=len(m.covariance)) for m in estimate.models]
+
+        def moved(step: float, estimate=estimate, ways=ways) -> np.ndarray:
+            models = []
+            for m, way in zip(estimate.models, ways, strict=True):
+                layout = problem_of(m, []).layout
+                y = layout.matrices(layout.vector(matrices_of(m)) + step * way)
+                space = replace(m.model, a=y.a, b=y.b, c=y.c, d=y.d, k=y.k)
+                models.append(replace(m, model=space))
+            return replace(estimate, models=tuple(models))._slopes(LINES)[0]
+
+        g, slope = estimate._slopes(LINES)
+        exact = slope @ np.concatenate(ways)
+        numeric = (moved(1e-6) - moved(-1e-6)) / 2e-6
+        np.testing.assert_allclose(
+            exact, numeric, rtol=0, atol=1e-5 * np.abs(numeric).max(), err_msg=name
+        )
+        assert g.shape == exact.shape
+
+
+def test_realizations_undo_loops_with_direct_terms() -> None:
+    """Random stable systems with direct terms everywhere, by the algebra of their responses."""
+    rng = np.random.default_rng(5)
+
+    def system(n: int, p: int, m: int) -> StateSpaceModel:
+        a = np.diag(rng.uniform(-0.8, 0.8, n))
+        b, c, d = rng.normal(size=(n, m)), rng.normal(size=(p, n)), rng.normal(size=(p, m))
+        return StateSpaceModel(1.0, a, b, c, d, np.zeros((n, p)), np.zeros((p, p)))
+
+    def at(model: StateSpaceModel) -> np.ndarray:
+        return model.response(LINES)["response"].values
+
+    closed_, back = system(3, 2, 2), system(2, 2, 2)
+    g = at(closed_) @ np.linalg.inv(np.eye(2) - at(back) @ at(closed_))
+    np.testing.assert_allclose(at(plant_of_closed_loop(closed_, back)), g, rtol=0, atol=1e-9)
+    y, u = system(3, 2, 2), system(2, 2, 2)
+    np.testing.assert_allclose(
+        at(plant_of_joint(y, u)), at(y) @ np.linalg.inv(at(u)), rtol=0, atol=1e-9
+    )
 
 
 def test_a_wrong_controller_is_noticed_and_its_bias_is_predicted() -> None:

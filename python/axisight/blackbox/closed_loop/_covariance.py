@@ -7,7 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from axisight.blackbox._data import Real
-from axisight.blackbox.prediction_error.state_space import InnovationsModel
+from axisight.blackbox.prediction_error.state_space import (
+    InnovationsModel,
+    matrices_of,
+    problem_of,
+)
 from axisight.records.experiment import Experiment
 from axisight.statistics.least_squares import inverse_root
 
@@ -49,7 +53,7 @@ def _influence(
     model: InnovationsModel, experiments: Sequence[Experiment]
 ) -> tuple[list[Real], list[Real]] | None:
     """Return influences (parameters, n, p) and errors (n, p) by experiment."""
-    problem, x = model.problem(experiments), model.matrices
+    problem, x = problem_of(model, experiments), matrices_of(model)
     ways = problem.layout.directions(x)
     slope = problem.jacobian(problem.layout.vector(x)) @ ways
     root = inverse_root(slope, len(slope) * np.finfo(float).eps)

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from scipy import optimize
 
 from axisight.arguments import Complex, Real, complexes, not_negative, positive, reals, whole
+from axisight.display.summary import summarized
 from axisight.errors import InputError
 
 ROUNDS = 50
@@ -221,6 +222,7 @@ def expected_errors(
     )
 
 
+@summarized
 @dataclass(frozen=True)
 class LimitingModel:
     """The model B / F to which a method tends, from `limiting_model`.

@@ -1,9 +1,9 @@
 """Where the search for a polynomial model of one output starts.
 
 A long ARX model is unbiased in open and closed loop. Its errors stand for the unknown e, so ARMAX
-coefficients follow by regression (Hannan and Rissanen, 1982); its pulse responses give B / F by the
-start of an output-error model. With one input that start also runs on data filtered by the long A, which
-makes their noise white. C and D follow the same way from what the plant leaves. A Box-Jenkins loss has
+coefficients follow by regression (Hannan and Rissanen, 1982); B / F is the nearest model of its order. With
+one input, the start of an output-error model also runs on data filtered by the long A, which makes
+their noise white. C and D follow the same way from what the plant leaves. A Box-Jenkins loss has
 local minima, so the search begins from several of these candidates.
 """
 
@@ -28,11 +28,11 @@ from axisight.errors import InputError
 LONG_ORDERS = (10, 30, 60)
 """Orders of the long ARX models to start from."""
 
-PULSE_SAMPLES = 1000
-"""Samples of their pulse responses."""
-
 SEARCHES = 3
 """Most starts of one search; more do not find lower losses."""
+
+NEAR = 0.03
+"""Distance of two starts, relative to their size, below which they count as one."""
 
 Coefficients = dict[tuple[str, int], Real]
 """Coefficients by polynomial and channel, from the first free lag on."""
@@ -60,7 +60,17 @@ def starts_of(problem: RowProblem) -> list[Real]:
             "to start from: lower nf for a plant that integrates, or record more samples"
         )
     linear = problem.orders.nc + problem.orders.nd + problem.orders.nf.sum() == 0
-    return [theta for _, theta in found[: 1 if linear else SEARCHES]]
+    return _different([theta for _, theta in found], 1 if linear else SEARCHES)
+
+
+def _different(candidates: list[Real], most: int) -> list[Real]:
+    """Return the first candidates that are not near an earlier one: near ones end at one minimum."""
+    kept: list[Real] = []
+    for theta in candidates:
+        size = NEAR * np.linalg.norm(theta)
+        if len(kept) < most and all(np.linalg.norm(theta - one) > size for one in kept):
+            kept.append(theta)
+    return kept
 
 
 def _vector(orders: RowOrders, found: Coefficients) -> Real:
@@ -88,7 +98,7 @@ def _plants(problem: RowProblem) -> Iterator[Coefficients]:
             yield _regressed(problem, _long_errors(problem, length))
             continue
         theta = _long_arx(problem, length)
-        parts = [_from_pulses(problem, theta, length)]
+        parts = [_from_long(problem, theta, length)]
         if len(orders.nb) == 1:
             parts.append(_from_filtered(problem, np.r_[1.0, theta[:length]]))
         yield from (_plant(orders, part) for part in parts if part is not None)
@@ -154,20 +164,23 @@ def _from_filtered(problem: RowProblem, whitening: Real) -> list[Real] | None:
     return None if theta is None else [theta]
 
 
-def _from_pulses(problem: RowProblem, theta: Real, length: int) -> list[Real] | None:
-    """Return B and F by input from the pulse responses of a long ARX model."""
+def _from_long(problem: RowProblem, theta: Real, length: int) -> list[Real] | None:
+    """Return B and F by input that come nearest to a long ARX model, as the prediction errors weigh it.
+
+    The distance of B/F from the long B_L / A_L with the noise model 1 / A_L is that of B/F (A_L u) from
+    B_L u (Zhu, 2001, asymptotic method).
+    """
     orders = problem.orders
-    bottom = stabilized(np.r_[1.0, theta[:length]])
-    pulse = np.zeros(PULSE_SAMPLES)
-    pulse[0] = 1.0
+    whitening = np.r_[1.0, theta[:length]]
     parts = []
     for j in range(len(orders.nb)):
         top = theta[length + j * (length + 1) : length + (j + 1) * (length + 1)]
-        response = np.asarray(signal.lfilter(top, bottom, pulse))
         one = slice(j, j + 1)
+        inputs = [signal.lfilter(whitening, [1.0], u[:, one], axis=0) for u in problem.inputs]
+        outputs = [signal.lfilter(top, [1.0], u[:, j]) for u in problem.inputs]
         part = refitted(
             OutputErrorProblem(
-                orders.nb[one], orders.nf[one], orders.nk[one], [pulse[:, None]], [response], 0
+                orders.nb[one], orders.nf[one], orders.nk[one], inputs, outputs, length
             )
         )
         if part is None:

@@ -142,7 +142,9 @@ class InnovationsModel:
         x = self.model
         p, m = x.d.shape
         expect_experiment(experiment, m, p, x.sample_time_s)
-        return np.asarray(experiment.output - self.problem([experiment]).errors(self.matrices)[0])
+        return np.asarray(
+            experiment.output - problem_of(self, [experiment]).errors(matrices_of(self))[0]
+        )
 
     def residual_tests(
         self, experiment: Experiment, *, lags: int = 25, probability: float = 0.99
@@ -166,22 +168,23 @@ class InnovationsModel:
         """Return ``model``."""
         return self.model
 
-    def problem(self, experiments: Sequence[Experiment]) -> InnovationsProblem:
-        """Return the search problem on ``experiments``, weighted by the noise of the model."""
-        p, m = self.model.d.shape
-        return InnovationsProblem(
-            Layout(self.model.order, m, p, self.direct, self.noise == "estimate"),
-            [e.input for e in experiments],
-            [e.output for e in experiments],
-            _weight(self.model.noise_covariance),
-            True,
-        )
 
-    @property
-    def matrices(self) -> Matrices:
-        """The matrices of ``model``."""
-        x = self.model
-        return Matrices(x.a, x.b, x.c, x.d, x.k)
+def problem_of(model: InnovationsModel, experiments: Sequence[Experiment]) -> InnovationsProblem:
+    """Return the search problem on ``experiments``, weighted by the noise of the model."""
+    p, m = model.model.d.shape
+    return InnovationsProblem(
+        Layout(model.model.order, m, p, model.direct, model.noise == "estimate"),
+        [e.input for e in experiments],
+        [e.output for e in experiments],
+        _weight(model.model.noise_covariance),
+        True,
+    )
+
+
+def matrices_of(model: InnovationsModel) -> Matrices:
+    """Return the matrices of the innovations form."""
+    x = model.model
+    return Matrices(x.a, x.b, x.c, x.d, x.k)
 
 
 def state_space_pem(
