@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -54,7 +56,7 @@ def realizations_from_rest(context: Context, runs: int) -> Complex:
     blocks = []
     for first in range(0, runs, _BLOCK):
         key = ("chapter8-average-block", first)
-        blocks.append(context.shared(key, lambda first=first: _block(context, first)))
+        blocks.append(context.shared(key, partial(_block, context, first)))
     return np.concatenate(blocks)[:runs]
 
 

@@ -23,8 +23,8 @@ from axisight_thesis.context import Context
 
 # Link of the joint: lateral centre of mass [m], products of inertia I_xy and I_yz [kg m^2].
 _LINKS = {
-    "axis2_yaw": (-0.96, 11.11, 10.46),
-    "axis3_yaw": (0.18, 23.05, 20.86),
+    "axis2_yaw": (-0.8887, 5.182, 13.64),
+    "axis3_yaw": (0.1759, 21.44, 21.11),
 }
 _XY, _YZ = 3, 5
 

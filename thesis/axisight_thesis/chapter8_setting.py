@@ -35,8 +35,8 @@ SQUARE_PERIOD_S = 5.0
 SMOOTHING_SAMPLES = 40
 # Number of the random stream of start angles.
 _START = 8
-# Of the single sinusoid, which starts at its largest velocity. The thesis does not state it.
-SINUSOID_PHASE_RAD = np.pi / 2
+# Of the single sinusoid, which begins at its largest negative velocity. The thesis does not state it.
+SINUSOID_PHASE_RAD = 1.5 * np.pi
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from axisight.frf.errors import relative_error, signal_to_noise_ratio
 from axisight_thesis.agreement import Agreement
 from axisight_thesis.chapter8_robot import weakly_coupled
 from axisight_thesis.chapter8_setting import PERIOD_S, Design, excited_lines
-from axisight_thesis.chapter8_study import Experiments, experiments, true_response
+from axisight_thesis.chapter8_study import Experiments, one_design, true_response
 from axisight_thesis.chapter8_tables import THESIS_8_2, mean_error_table, realizations
 from axisight_thesis.context import Context
 from axisight_thesis.element_plot import decibel
@@ -49,19 +49,23 @@ SIGNALS = ("input", "output")
 # Factors that hold for 95 % and for half of the errors at one line, whose magnitude scatters as a
 # Rayleigh variable about its mean.
 RAYLEIGH_FACTORS = (3.9, 1.46)
-_LARGEST, _MEDIAN = 3.0, 1.4
 _LINES_HZ = (1.1, 1.2, 1.3, 1.5, 1.9)
+_LINE_RUNS = 6
 
 
 def single_frequency(
-    context: Context, frequency_hz: float = SINUSOID_HZ
+    context: Context, frequency_hz: float = SINUSOID_HZ, runs: int | None = None
 ) -> list[list[Experiments]]:
-    """Return realizations of sinusoid and of multisine at one frequency, on the robot of ``context``."""
+    """Return realizations of sinusoid and of multisine at one frequency, on the robot of ``context``.
+
+    By default 24, because a single line scatters more than the means over lines of Table 8.2.
+    """
     line = int(np.flatnonzero(excited_lines() == round(frequency_hz * PERIOD_S))[0])
-    runs = range(realizations(context))
+    usual = realizations(context) * (1 if context.quick else 3)
+    chosen = range(min(runs or usual, usual))
     sinusoid = Design("T1", square=True, sinusoid_hz=frequency_hz)
-    multisines = [experiments(context, MULTISINE, run).at(line) for run in runs]
-    return [[experiments(context, sinusoid, run) for run in runs], multisines]
+    multisines = [one_design(context, MULTISINE, run).at(line) for run in chosen]
+    return [[one_design(context, sinusoid, run) for run in chosen], multisines]
 
 
 def snr(found: Experiments) -> tuple[Real, Real]:
@@ -77,15 +81,17 @@ def snr_runs(context: Context) -> Real:
     return np.asarray(np.array(found)[:, :, :, 0].transpose(1, 2, 0, 3, 4))
 
 
-def error_runs(context: Context, frequency_hz: float = SINUSOID_HZ) -> Real:
+def error_runs(
+    context: Context, frequency_hz: float = SINUSOID_HZ, runs: int | None = None
+) -> Real:
     """Return relative errors [1], (realization, sinusoid or multisine, output, input)."""
 
     def error(found: Experiments) -> Real:
         true = true_response(context, found.frequency_hz)
         return np.asarray(np.abs(relative_error(found.estimate, true)[0]))
 
-    found = single_frequency(context, frequency_hz)
-    return np.array([[error(f) for f in runs] for runs in found]).swapaxes(0, 1)
+    found = single_frequency(context, frequency_hz, runs)
+    return np.array([[error(f) for f in each] for each in found]).swapaxes(0, 1)
 
 
 def single_frequency_snr(context: Context) -> Real:
@@ -105,12 +111,14 @@ def table_8_3(context: Context) -> Item:
     rows, claims = [], []
     for m, name in enumerate(SIGNALS):
         for k, what in enumerate(EXCITATIONS):
-            values = (x[:, m, k].mean(axis=0) for x in (runs, preset))
-            rows += _rows({"signal": name, "excitation": what}, THESIS_8_3[m, k], *values, "db")
+            here, before = (x[:, m, k].mean(axis=0) for x in (runs, preset))
+            rows += _rows(
+                {"signal": name, "excitation": what}, THESIS_8_3[m, k], here, before, "db"
+            )
         # An amplitude ratio grows tenfold in 20 dB.
         amplitudes = [10 ** (x / 20) for x in (THESIS_8_3[m], runs[:, m], preset[:, m])]
-        same, before = Agreement.of(*amplitudes[:2]), Agreement.of(amplitudes[0], amplitudes[2])
-        claims += _agreements("8.3", same, before, f"-{name}", f"{name} SNR")
+        same, other = (Agreement.of(amplitudes[0], x) for x in amplitudes[1:])
+        claims += _agreements("8.3", same, other, f"-{name}", f"{name} SNR")
     title = f"Signal-to-noise ratio at {SINUSOID_HZ} Hz"
     return Item("table-8.3", title, {"": pd.DataFrame(rows)}, {}, tuple(claims))
 
@@ -121,20 +129,21 @@ def table_8_4(context: Context) -> Item:
     runs, preset = (100 * error_runs(c) for c in (weakly_coupled(context), context))
     rows = []
     for k, what in enumerate(EXCITATIONS):
-        values = (x[:, k].mean(axis=0) for x in (runs, preset))
-        rows += _rows({"excitation": what}, THESIS_8_4[k], *values, "percent")
+        means = [x[:, k].mean(axis=0) for x in (runs, preset)]
+        rows += _rows({"excitation": what}, THESIS_8_4[k], means[0], means[1], "percent")
     factor, before = _factor(runs, THESIS_8_4), _factor(preset, THESIS_8_4)
+    largest, median = RAYLEIGH_FACTORS
     value = Claim(
         "table-8.4",
         "8.3.2",
-        f"Table 8.4 comes out: every entry within a factor {_LARGEST:g}, the median within {_MEDIAN:g}.",
-        bool(factor.max() <= _LARGEST and np.median(factor) <= _MEDIAN),
+        "Table 8.4 comes out as far as one line of one realization allows: every entry within a factor "
+        f"{largest:g} (95 % of single errors), the median within {median:g} (half of them).",
+        bool(factor.max() <= largest and np.median(factor) <= median),
         f"largest factor {factor.max():.2f}, median {np.median(factor):.2f} ({len(runs)} start angles); "
-        f"on the preset {before.max():.2f} and {np.median(before):.2f}. One line of one realization "
-        f"scatters by up to {RAYLEIGH_FACTORS[0]:g} (95 %) and {RAYLEIGH_FACTORS[1]:g} (half)",
+        f"on the preset {before.max():.2f} and {np.median(before):.2f}",
     )
-    agreed = (Agreement.of(THESIS_8_4, x) for x in (runs, preset))
-    claims = (value, *_agreements("8.4", *agreed, "", "errors"))
+    same, other = (Agreement.of(THESIS_8_4, x) for x in (runs, preset))
+    claims = (value, *_agreements("8.4", same, other, "", "errors"))
     tables = {"": pd.DataFrame(rows), "robots": _robots(context), "lines": _lines(context)}
     return Item("table-8.4", f"Relative error at {SINUSOID_HZ} Hz", tables, {}, claims)
 
@@ -189,7 +198,7 @@ def _lines(context: Context) -> pd.DataFrame:
     rows = []
     for name, robot in (("preset", context), ("weakly coupled", weakly_coupled(context))):
         for frequency in _LINES_HZ:
-            factor = _factor(100 * error_runs(robot, frequency), THESIS_8_4)
+            factor = _factor(100 * error_runs(robot, frequency, _LINE_RUNS), THESIS_8_4)
             row: dict[str, object] = {"robot": name, "frequency_hz": frequency}
             for k, what in enumerate(EXCITATIONS):
                 row[f"{what}_largest_factor"] = factor[k].max()

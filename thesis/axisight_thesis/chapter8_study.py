@@ -61,6 +61,11 @@ def experiments(context: Context, design: Design, run: int = 0) -> Experiments:
     standard = context.shared(("chapter8", run), lambda: _standard(context, run))
     if design in standard:
         return standard[design]
+    return one_design(context, design, run)
+
+
+def one_design(context: Context, design: Design, run: int = 0) -> Experiments:
+    """Return what `experiments` returns, without a simulation of other designs."""
     key = ("chapter8", run, design)
     return context.shared(key, lambda: _simulated(context, [design], run)[design])
 
@@ -115,13 +120,17 @@ def _standard(context: Context, run: int) -> dict[Design, Experiments]:
     return _simulated(context, list(DESIGNS), run)
 
 
+def _noise_run(design: Design, run: int) -> int:
+    """Return the number of the noise of a design's first experiment; every one has its own."""
+    if design.sinusoid_hz is not None:
+        return _SINUSOID_NOISE + 3 * run
+    return 3 * (len(DESIGNS) * run + DESIGNS.index(design))
+
+
 def _simulated(context: Context, designs: list[Design], run: int) -> dict[Design, Experiments]:
     robot, seed = context.robot, context.seed
     refs = np.concatenate([references(robot, d, seed, run) for d in designs])
-    # Every realization and design gets different noise.
-    first = len(refs) * run
-    if designs[0].sinusoid_hz is not None:
-        first += _SINUSOID_NOISE
+    first = _noise_run(designs[0], run)
     effects = ripple(robot, start_angles(robot, seed, run))
     simulated = simulate_period(context, refs, effects, noise_seed=seed, first_run=first)
     out = {}

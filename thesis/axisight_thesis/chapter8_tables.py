@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -57,8 +59,7 @@ def mean_error_runs(context: Context, runs: int) -> Real:
         return np.array([mean_relative_error(estimate, true) for estimate in found])
 
     shared = [
-        context.shared(("chapter8-mean-error", run), lambda run=run: one(run))
-        for run in range(runs)
+        context.shared(("chapter8-mean-error", run), partial(one, run)) for run in range(runs)
     ]
     return np.array(shared)
 
