@@ -11,7 +11,7 @@ from scipy import stats
 from axisight_thesis import Context, context, registered
 from axisight_thesis.agreement import Agreement
 from axisight_thesis.chapter8_averages import DESIGN, averaged, realizations_from_rest
-from axisight_thesis.chapter8_robot import weakly_coupled
+from axisight_thesis.chapter8_robot import CONTROLLER_SPEED, weakly_coupled
 from axisight_thesis.chapter8_setting import (
     PERIOD_S,
     RESOLVER_RIPPLE_RAD,
@@ -96,7 +96,7 @@ def test_averages_are_those_of_their_definitions(quick: Context) -> None:
     np.testing.assert_allclose(study["standard_error"].values, scatter / 2)
 
 
-def test_the_weakly_coupled_robot_changes_six_numbers(quick: Context) -> None:
+def test_the_weakly_coupled_robot_changes_six_numbers_and_its_gains(quick: Context) -> None:
     weak = weakly_coupled(quick)
     before, after = (tomllib.loads(c.robot.toml)["joint"] for c in (quick, weak))
     changed = 0
@@ -107,6 +107,9 @@ def test_the_weakly_coupled_robot_changes_six_numbers(quick: Context) -> None:
         assert a == b
     assert changed == 6
     assert weakly_coupled(quick) is weak
+    gains = [c.robot.controller_gains for c in (quick, weak)]
+    assert gains[1]["kp"] == pytest.approx(CONTROLLER_SPEED * gains[0]["kp"])
+    assert gains[1]["ki"] == pytest.approx(CONTROLLER_SPEED**2 * gains[0]["ki"])
 
 
 def test_only_the_coupling_of_axis_1_changes_at_low_frequency(quick: Context) -> None:
