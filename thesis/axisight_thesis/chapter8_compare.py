@@ -70,9 +70,10 @@ def comparison_runs(context: Context) -> int:
     return 2 if context.quick else 12
 
 
-def errors(context: Context, design: Design) -> Real:
+def errors(context: Context, design: Design, runs: int | None = None) -> Real:
     """Return relative errors under ripple, (realization, n_freq, output, input)."""
-    found = [experiments(context, design, run) for run in range(comparison_runs(context))]
+    count = runs or comparison_runs(context)
+    found = [experiments(context, design, run) for run in range(count)]
     true = true_response(context, found[0].frequency_hz)
     return np.array([np.abs(f.estimate / true - 1) for f in found])
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from axisight.frf.errors import relative_error, signal_to_noise_ratio
 from axisight_thesis.agreement import Agreement
-from axisight_thesis.chapter8_robot import weakly_coupled
+from axisight_thesis.chapter8_robot import CONTROLLER_SPEED, weakly_coupled
 from axisight_thesis.chapter8_setting import PERIOD_S, Design, excited_lines
 from axisight_thesis.chapter8_study import Experiments, one_design, true_response
 from axisight_thesis.chapter8_tables import THESIS_8_2, mean_error_table, realizations
@@ -51,6 +54,8 @@ SIGNALS = ("input", "output")
 RAYLEIGH_FACTORS = (3.9, 1.46)
 _LINES_HZ = (1.1, 1.2, 1.3, 1.5, 1.9)
 _LINE_RUNS = 6
+# Speeds of the controller over the preset's.
+_SPEEDS = (1.0, 0.5)
 
 
 def single_frequency(
@@ -75,9 +80,9 @@ def snr(found: Experiments) -> tuple[Real, Real]:
     return decibel(u), decibel(y)
 
 
-def snr_runs(context: Context) -> Real:
+def snr_runs(context: Context, runs: int | None = None) -> Real:
     """Return Table 8.3 [dB], (realization, input or output, sinusoid or multisine, row, column)."""
-    found = [[snr(f) for f in runs] for runs in single_frequency(context)]
+    found = [[snr(f) for f in each] for each in single_frequency(context, runs=runs)]
     return np.asarray(np.array(found)[:, :, :, 0].transpose(1, 2, 0, 3, 4))
 
 
@@ -173,30 +178,51 @@ def _agreements(
 
 
 def _robots(context: Context) -> pd.DataFrame:
-    """Return how far the tables are from the thesis, for both robots."""
+    """Return how far the tables are from the thesis, for both robots and for slower control."""
+    weak = weakly_coupled(context)
     rows = []
-    for name, robot in (("preset", context), ("weakly coupled", weakly_coupled(context))):
-        decibels = np.abs(snr_runs(robot).mean(axis=0) - THESIS_8_3)
-        errors = _factor(100 * error_runs(robot), THESIS_8_4)
+    for name, robot in (("preset", context), ("section 8.3.2", weak)):
         designs = np.exp(np.abs(np.log(mean_error_table(robot) / THESIS_8_2)))
-        rows.append(
-            {
-                "robot": name,
-                "table_8.2_largest_factor": designs.max(),
-                "table_8.2_median_factor": np.median(designs),
-                "table_8.3_largest_db": decibels.max(),
-                "table_8.3_median_db": np.median(decibels),
-                "table_8.4_largest_factor": errors.max(),
-                "table_8.4_median_factor": np.median(errors),
-            }
-        )
+        row = {
+            "table_8.2_largest_factor": designs.max(),
+            "table_8.2_median_factor": _middle(designs),
+        }
+        rows.append({"robot": name, **row, **_distances(robot)})
+    for speed in _SPEEDS:
+        slower = context.shared(("chapter8-speed", speed), partial(_at_speed, context, speed))
+        name = f"section 8.3.2, controller speed {speed:g}"
+        rows.append({"robot": name, **_distances(slower, _LINE_RUNS)})
     return pd.DataFrame(rows)
+
+
+def _at_speed(context: Context, speed: float) -> Context:
+    """Return the robot of section 8.3.2 with another speed of the controller."""
+    weak = weakly_coupled(context)
+    robot = weak.robot.with_controller_speed(speed / CONTROLLER_SPEED)
+    return replace(weak, robot=robot, _studies={})
+
+
+def _distances(robot: Context, runs: int | None = None) -> dict[str, float]:
+    """Return the distances of Tables 8.3 [dB] and 8.4 from the thesis."""
+    decibels = np.abs(snr_runs(robot, runs).mean(axis=0) - THESIS_8_3)
+    factor = _factor(100 * error_runs(robot, runs=runs), THESIS_8_4)
+    return {
+        "table_8.3_median_db": _middle(decibels),
+        "table_8.3_input_median_db": _middle(decibels[0]),
+        "table_8.3_output_median_db": _middle(decibels[1]),
+        "table_8.4_largest_factor": float(factor.max()),
+        "table_8.4_median_factor": _middle(factor),
+    }
+
+
+def _middle(values: Real) -> float:
+    return float(np.median(values))
 
 
 def _lines(context: Context) -> pd.DataFrame:
     """Return how far Table 8.4 is from the thesis if the sinusoid has another frequency."""
     rows = []
-    for name, robot in (("preset", context), ("weakly coupled", weakly_coupled(context))):
+    for name, robot in (("preset", context), ("section 8.3.2", weakly_coupled(context))):
         for frequency in _LINES_HZ:
             factor = _factor(100 * error_runs(robot, frequency, _LINE_RUNS), THESIS_8_4)
             row: dict[str, object] = {"robot": name, "frequency_hz": frequency}

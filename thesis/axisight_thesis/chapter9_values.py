@@ -21,8 +21,10 @@ _FLEXIBLE = ("k1", "k3", "d")
 _NOTICEABLE = 1.0
 
 
-def parameter_claims(here: Values, thesis: Values) -> tuple[Claim, ...]:
-    """Return the claims on Table 9.1.
+def parameter_claims(
+    here: Values, thesis: Values, one_arm: Mapping[str, float]
+) -> tuple[Claim, ...]:
+    """Return the claims on Table 9.1; ``one_arm`` are the values if the arm is one mass.
 
     The tolerance is the range of the thesis's own estimates m1 to m3: what a change of data does.
     """
@@ -47,7 +49,8 @@ def parameter_claims(here: Values, thesis: Values) -> tuple[Claim, ...]:
                 f"Table 9.1, {what}: the means of m1 to m3 differ from those of the thesis by no more "
                 "than its range over m1 to m3.",
                 all(inside),
-                f"here and in the thesis: {'; '.join(texts)}",
+                f"here and in the thesis: {'; '.join(texts)}. If the arm is one mass: "
+                + ", ".join(f"{p} {one_arm[p]:.3g}" for p in parameters),
             )
         )
     return tuple(claims)

@@ -77,6 +77,9 @@ def test_realizations_are_a_function_of_seed_and_run(quick: Context) -> None:
     few = realizations_from_rest(quick, 3)
     again = realizations_from_rest(context(quick=True, threads=2), 9)
     assert few.tobytes() == again[:3].tobytes()
+    # A realization of the next block has a multisine of its own, too.
+    near, far = (np.median(np.abs(again[k] - again[0])) for k in (1, 8))
+    assert far > 0.5 * near
     other = realizations_from_rest(context(seed=1, quick=True), 3)
     assert not np.allclose(few, other)
     # The first begins at rest like the one of Table 8.2, and differs by the noise only.
