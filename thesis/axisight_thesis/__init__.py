@@ -6,9 +6,10 @@ registered by name (``"table-8.2"``, ``"figure-8.9"``). :func:`run` computes ite
 as CSV, figures as PDF and PNG, and a computed verdict with evidence for each claim of the text.
 """
 
+from axisight_thesis.claims_file import read_claims, record_claims
 from axisight_thesis.context import Context, context
 from axisight_thesis.item import Claim, Item, item, item_names, registered
-from axisight_thesis.write import run, write_claims, write_item
+from axisight_thesis.write import run, write_item
 
 __all__ = [
     "Claim",
@@ -17,8 +18,9 @@ __all__ = [
     "context",
     "item",
     "item_names",
+    "read_claims",
+    "record_claims",
     "registered",
     "run",
-    "write_claims",
     "write_item",
 ]

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from axisight.simulation import simulate_batch
 from axisight_thesis.chapter8_figures import error_item
 from axisight_thesis.chapter8_setting import Design, excited_lines, references
+from axisight_thesis.chapter8_sinusoid import MULTISINE, snr
 from axisight_thesis.chapter8_study import (
     Experiments,
     experiments,
     from_signals,
     true_response,
 )
-from axisight_thesis.chapter8_tables import MULTISINE, realizations, snr
+from axisight_thesis.chapter8_tables import realizations
 from axisight_thesis.context import Context
 from axisight_thesis.element_plot import (
     DISTURBANCE,

@@ -7,7 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight.frf.errors import mean_relative_error
-from axisight_thesis.chapter8_averages import averaged
+from axisight_thesis.chapter8_averages import averaged, realizations_from_rest
 from axisight_thesis.chapter8_compare import (
     COUPLING,
     DIAGONAL,
@@ -17,7 +17,7 @@ from axisight_thesis.chapter8_compare import (
     listed,
 )
 from axisight_thesis.chapter8_setting import DESIGNS, PERIOD_S, excited_lines
-from axisight_thesis.chapter8_study import experiments, same_excitation, true_response
+from axisight_thesis.chapter8_study import same_excitation, true_response
 from axisight_thesis.chapter8_tables import mean_errors
 from axisight_thesis.context import Context
 from axisight_thesis.item import Result, Statements
@@ -94,7 +94,7 @@ def _twenty(context: Context) -> Result:
 
 def _different(context: Context, runs: int) -> Real:
     """Return the error of the mean over realizations over the mean of their errors."""
-    found = [experiments(context, DESIGNS[T1_SQUARE], run).estimate for run in range(runs)]
+    found = realizations_from_rest(context, runs)
     true = true_response(context, excited_lines() / PERIOD_S)
     single = np.mean([mean_relative_error(f, true) for f in found], axis=0)
     return np.asarray(mean_relative_error(np.mean(found, axis=0), true) / single)

@@ -20,13 +20,9 @@ from axisight_thesis.chapter8_compare import (
     listed,
 )
 from axisight_thesis.chapter8_setting import DESIGNS, PERIOD_S, excited_lines, references
+from axisight_thesis.chapter8_sinusoid import single_frequency_error, snr
 from axisight_thesis.chapter8_study import experiments, simulate_nonlinear, true_response
-from axisight_thesis.chapter8_tables import (
-    mean_errors,
-    realizations,
-    single_frequency_error,
-    snr,
-)
+from axisight_thesis.chapter8_tables import mean_errors, realizations
 from axisight_thesis.context import Context
 from axisight_thesis.item import Result, Statements
 

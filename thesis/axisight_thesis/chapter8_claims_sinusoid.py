@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from axisight_thesis.chapter8_tables import single_frequency_error, single_frequency_snr
+from axisight_thesis.chapter8_sinusoid import single_frequency_error, single_frequency_snr
 from axisight_thesis.context import Context
 from axisight_thesis.item import Result, Statements
 

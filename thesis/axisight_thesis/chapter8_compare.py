@@ -9,17 +9,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from axisight.frf.errors import mean_relative_error
 from axisight_thesis.chapter8_setting import (
-    DESIGNS,
-    PERIOD_S,
     Design,
     excited_lines,
     square_lines,
     strong_square_lines,
 )
 from axisight_thesis.chapter8_study import experiments, true_response
-from axisight_thesis.chapter8_tables import realizations
+from axisight_thesis.chapter8_tables import mean_error_runs, realizations
 from axisight_thesis.context import Context
 
 Real = NDArray[np.float64]
@@ -73,31 +70,17 @@ def comparison_runs(context: Context) -> int:
     return 2 if context.quick else 12
 
 
-def errors(context: Context, design: Design) -> Real:
+def errors(context: Context, design: Design, runs: int | None = None) -> Real:
     """Return relative errors under ripple, (realization, n_freq, output, input)."""
-    found = [experiments(context, design, run) for run in range(comparison_runs(context))]
+    count = runs or comparison_runs(context)
+    found = [experiments(context, design, run) for run in range(count)]
     true = true_response(context, found[0].frequency_hz)
     return np.array([np.abs(f.estimate / true - 1) for f in found])
 
 
-def mean_error_runs(context: Context) -> Real:
-    """Return mean relative errors, (realization, design, output, input)."""
-
-    def make() -> Real:
-        true = true_response(context, excited_lines() / PERIOD_S)
-        return np.array(
-            [
-                [mean_relative_error(experiments(context, d, run).estimate, true) for d in DESIGNS]
-                for run in range(comparison_runs(context))
-            ]
-        )
-
-    return context.shared("chapter8-mean-error-runs", make)
-
-
 def compare(context: Context, over: int, under: int) -> Ratios:
     """Return the mean error of a design over that of another, by their places in DESIGNS."""
-    logs = np.log(mean_error_runs(context))
+    logs = np.log(mean_error_runs(context, comparison_runs(context)))
     return Ratios(*_mean(logs[:, over] - logs[:, under]))
 
 

@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.frf.errors import relative_error
+from axisight_thesis.chapter8_robot import weakly_coupled
 from axisight_thesis.chapter8_setting import Design, excited_lines, square_lines
+from axisight_thesis.chapter8_sinusoid import MULTISINE, SINUSOID
 from axisight_thesis.chapter8_study import Experiments, experiments, true_response
-from axisight_thesis.chapter8_tables import MULTISINE, SINUSOID, realizations
+from axisight_thesis.chapter8_tables import realizations
 from axisight_thesis.context import Context
 from axisight_thesis.element_plot import (
     ESTIMATE,
@@ -106,9 +108,10 @@ for _number, _design in ERROR_FIGURES.items():
 @item("figure-8.8")
 def figure_8_8(context: Context) -> Item:
     """Return the estimates of a sinusoid and a multisine beside the truth."""
-    multisine, single = experiments(context, MULTISINE), experiments(context, SINUSOID)
+    robot = weakly_coupled(context)
+    multisine, single = experiments(robot, MULTISINE), experiments(robot, SINUSOID)
     frequency = multisine.frequency_hz
-    true = np.abs(true_response(context, frequency))
+    true = np.abs(true_response(robot, frequency))
     estimate = np.abs(multisine.estimate)
     sinusoid = np.abs(single.estimate)
     curves = [

@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from axisight import excitation
 from axisight.effects import Effect
@@ -33,6 +33,10 @@ PEAK_RAD_S = 8.0
 SQUARE_RAD_S = 9.6
 SQUARE_PERIOD_S = 5.0
 SMOOTHING_SAMPLES = 40
+# Number of the random stream of start angles.
+_START = 8
+# Of the single sinusoid, which begins at its largest negative velocity. The thesis does not state it.
+SINUSOID_PHASE_RAD = 1.5 * np.pi
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,7 @@ def references(robot: Robot, design: Design, seed: int, run: int) -> Real:
         broadband = _multisine(step, seed, run)
     else:
         line = round(design.sinusoid_hz * PERIOD_S)
-        broadband = multisine(PERIOD_S, step, lines=[line], phases=[0.0])
+        broadband = multisine(PERIOD_S, step, lines=[line], phases=[SINUSOID_PHASE_RAD])
     wave = square(
         SQUARE_PERIOD_S, step, amplitude=SQUARE_RAD_S, smoothing_samples=SMOOTHING_SAMPLES
     )
@@ -124,30 +128,49 @@ def clipped(signal: Multisine) -> Multisine:
     ).signal
 
 
-def ripple(robot: Robot) -> list[Effect]:
+def start_angles(robot: Robot, seed: int, run: int) -> Real:
+    """Return the motor angles [rad] at which a realization begins, (axis,), a function of (seed, run).
+
+    The thesis does not state them, but they set the phase of the ripple. Realization 0 begins at the
+    operating point. The others are uniform over a turn, the common period of all orders of the ripple.
+    """
+    if run == 0:
+        return np.zeros(robot.n_axes)
+    return np.random.default_rng([seed, run, _START]).uniform(0, 2 * np.pi, robot.n_axes)
+
+
+def ripple(robot: Robot, start_rad: ArrayLike = 0.0) -> list[Effect]:
     """Return the disturbances (8.2) of Table 8.1 on every axis.
+
+    ``start_rad`` adds a motor angle [rad] to the argument of the ripple, one for all axes or (axis,).
 
     The model of the thesis is linear, so its commanded torque is the deviation from rest. The torque
     here includes the static load, 22 and 24 Nm on axes 2 and 3, to which proportional ripple would
     apply too. A ripple of constant amplitude therefore subtracts the share of the load.
     """
     static = robot.equilibrium()["motor_torque_nm"].values
+    starts = np.broadcast_to(np.asarray(start_rad, float), (robot.n_axes,))
     effects = []
-    for axis, torque in zip(robot.axis_numbers(), static, strict=True):
-        torques = _terms(TORQUE_RIPPLE_NM, "{}", "_nm") | _terms(PROPORTIONAL_RIPPLE, "u", "")
+    for axis, torque, start in zip(robot.axis_numbers(), static, starts, strict=True):
+        torques = _terms(TORQUE_RIPPLE_NM, "{}", "_nm", start)
+        torques |= _terms(PROPORTIONAL_RIPPLE, "u", "", start)
         effects.append(Effect("torque_ripple", axis, torques))
         held = tuple((n, -a * torque, phase) for n, a, phase in PROPORTIONAL_RIPPLE)
-        effects.append(Effect("torque_ripple", axis, _terms(held, "{}", "_nm")))
-        effects.append(Effect("resolver_ripple", axis, _terms(RESOLVER_RIPPLE_RAD, "{}", "_rad")))
+        effects.append(Effect("torque_ripple", axis, _terms(held, "{}", "_nm", start)))
+        resolver = _terms(RESOLVER_RIPPLE_RAD, "{}", "_rad", start)
+        effects.append(Effect("resolver_ripple", axis, resolver))
     return effects
 
 
-def _terms(sines: tuple[tuple[int, float, float], ...], label: str, unit: str) -> dict[str, float]:
-    """Return ``a sin(n x + phase)`` as the parameters of a ripple effect."""
+def _terms(
+    sines: tuple[tuple[int, float, float], ...], label: str, unit: str, start_rad: float
+) -> dict[str, float]:
+    """Return ``a sin(n (x + start) + phase)`` as the parameters of a ripple effect."""
     out = {}
     for k, (order, amplitude, phase) in enumerate(sines, 1):
         name = label.format(k)
+        angle = order * start_rad + phase
         out[f"order_{name}"] = float(order)
-        out[f"cosine_{name}{unit}"] = amplitude * float(np.sin(phase))
-        out[f"sine_{name}{unit}"] = amplitude * float(np.cos(phase))
+        out[f"cosine_{name}{unit}"] = amplitude * float(np.sin(angle))
+        out[f"sine_{name}{unit}"] = amplitude * float(np.cos(angle))
     return out

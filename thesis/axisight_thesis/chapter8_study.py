@@ -20,12 +20,16 @@ from axisight_thesis.chapter8_setting import (
     excited_lines,
     references,
     ripple,
+    start_angles,
 )
 from axisight_thesis.context import Context
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Lines = NDArray[np.int64]
+
+# First noise runs of experiments that are not those of Table 8.2.
+_SINUSOID_NOISE = 2**32
 
 
 @dataclass(frozen=True)
@@ -50,10 +54,18 @@ class Experiments:
 
 
 def experiments(context: Context, design: Design, run: int = 0) -> Experiments:
-    """Return one realization of a design, with the ripple of Table 8.1 and sensor noise."""
+    """Return one realization of a design, with the ripple of Table 8.1 and sensor noise.
+
+    Every realization has its own multisine, noise and start angle. The sinusoid is always the same.
+    """
     standard = context.shared(("chapter8", run), lambda: _standard(context, run))
     if design in standard:
         return standard[design]
+    return one_design(context, design, run)
+
+
+def one_design(context: Context, design: Design, run: int = 0) -> Experiments:
+    """Return what `experiments` returns, without a simulation of other designs."""
     key = ("chapter8", run, design)
     return context.shared(key, lambda: _simulated(context, [design], run)[design])
 
@@ -108,13 +120,19 @@ def _standard(context: Context, run: int) -> dict[Design, Experiments]:
     return _simulated(context, list(DESIGNS), run)
 
 
+def _noise_run(design: Design, run: int) -> int:
+    """Return the number of the noise of a design's first experiment; every one has its own."""
+    if design.sinusoid_hz is not None:
+        return _SINUSOID_NOISE + 3 * run
+    return 3 * (len(DESIGNS) * run + DESIGNS.index(design))
+
+
 def _simulated(context: Context, designs: list[Design], run: int) -> dict[Design, Experiments]:
-    refs = np.concatenate([references(context.robot, d, context.seed, run) for d in designs])
-    # Every realization and design gets different noise.
-    first = len(refs) * run if designs[0].sinusoid_hz is None else 2**32
-    simulated = simulate_period(
-        context, refs, ripple(context.robot), noise_seed=context.seed, first_run=first
-    )
+    robot, seed = context.robot, context.seed
+    refs = np.concatenate([references(robot, d, seed, run) for d in designs])
+    first = _noise_run(designs[0], run)
+    effects = ripple(robot, start_angles(robot, seed, run))
+    simulated = simulate_period(context, refs, effects, noise_seed=seed, first_run=first)
     out = {}
     for k, design in enumerate(designs):
         part = simulated.isel(run=slice(3 * k, 3 * k + 3))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import pandas as pd
 import xarray as xr
@@ -13,11 +14,14 @@ from axisight_thesis.chapter9_machine import M3, Machine, chain
 from axisight_thesis.chapter9_study import (
     NAMES,
     SETS,
+    fitted,
     measured,
     models,
     records,
     simulated,
+    three_masses,
 )
+from axisight_thesis.chapter9_values import change_claims, fit_claims, parameter_claims
 from axisight_thesis.context import Context
 from axisight_thesis.item import Item, item
 
@@ -94,7 +98,10 @@ def table_9_1(context: Context) -> Item:
         row |= {f"thesis_{m}": v for m, v in zip(_MODELS, TABLE_9_1[name], strict=True)}
         rows.append(row)
     title = "Estimated parameters; m0 from steps 1 and 2, the others from step 3"
-    return Item("table-9.1", title, {"": pd.DataFrame(rows)})
+    here = {name: [found[m][name] for m in _MODELS] for name in NAMES}
+    one_arm = fitted(context, replace(STANDARD, third_mass=False), max_iterations=100).parameters
+    claims = parameter_claims(here, TABLE_9_1, one_arm)
+    return Item("table-9.1", title, {"": pd.DataFrame(rows)}, {}, claims)
 
 
 @item("table-9.2")
@@ -107,7 +114,9 @@ def table_9_2(context: Context) -> Item:
         row |= {m: float(found.sel(data_set=str(n), estimated_on=m)) for m in _MODELS}
         row |= {f"thesis_{m}": v for m, v in zip(_MODELS, TABLE_9_2[n], strict=True)}
         rows.append(row)
-    return Item("table-9.2", "Model fit on the three data sets [%]", {"": pd.DataFrame(rows)})
+    claims = fit_claims(found, TABLE_9_2, three_masses(context, STANDARD).fit_percent)
+    title = "Model fit on the three data sets [%]"
+    return Item("table-9.2", title, {"": pd.DataFrame(rows)}, {}, claims)
 
 
 @item("table-9.3")
@@ -126,4 +135,5 @@ def table_9_3(context: Context) -> Item:
                 row[f"thesis_set_{n}_{sign}"] = was
         rows.append(row)
     title = "Difference in fit of m3 when one parameter changes by 20 % [% points]"
-    return Item("table-9.3", title, {"": pd.DataFrame(rows)})
+    claims = change_claims(found, TABLE_9_3)
+    return Item("table-9.3", title, {"": pd.DataFrame(rows)}, {}, claims)

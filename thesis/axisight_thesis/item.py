@@ -97,6 +97,7 @@ _MODULES: tuple[str, ...] = (
     "chapter7_sinusoid",
     "chapter7_conclusions",
     "chapter8_tables",
+    "chapter8_sinusoid",
     "chapter8_figures",
     "chapter8_averages",
     "appendix_a",

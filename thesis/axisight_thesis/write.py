@@ -1,16 +1,16 @@
-"""Items and claims on disk."""
+"""Items on disk."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 
-import pandas as pd
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from axisight_thesis.claims_file import read_claims, record_claims
 from axisight_thesis.context import Context
-from axisight_thesis.item import Claim, Item, item_names, registered
+from axisight_thesis.item import Item, item_names, registered
 
 Progress = Callable[[str, int, int], None]
 
@@ -24,21 +24,23 @@ def run(
     """Return the computed items that ``name`` selects, in order, and write them to ``out`` if given.
 
     ``progress`` is called before each item with its name, the number of finished items and the total.
-    Raises InputError for an unknown name, before any computation.
+    ``claims.md`` in ``out`` also keeps the claims of items of earlier runs, and names the items that
+    it lacks. Raises InputError, before any computation, for an unknown name and for a damaged record
+    of earlier claims.
     """
     names = item_names(name)
     items = registered()
+    if out is not None:
+        read_claims(out)
     done = []
     for k, one in enumerate(names):
         progress(one, k, len(names))
         made = items[one](context)
         if out is not None:
             write_item(made, out, quick=context.quick)
+            record_claims([made], context, out, list(items))
         done.append(made)
     progress("done", len(names), len(names))
-    claims = [claim for made in done for claim in made.claims]
-    if out is not None and claims:
-        write_claims(claims, out)
     return done
 
 
@@ -74,31 +76,6 @@ def _draw(figure: Figure, path: Path, quick: bool) -> list[Path]:
     # Without a creation date, the same study gives the same bytes.
     figure.savefig(pdf, metadata={"CreationDate": None})
     return [pdf, png]
-
-
-def write_claims(claims: Iterable[Claim], out: Path) -> list[Path]:
-    """Write ``claims.csv`` and ``claims.md``, ordered by section, and return the paths."""
-    out.mkdir(parents=True, exist_ok=True)
-    claims = sorted(claims, key=lambda c: c.section)
-    columns = ["id", "section", "statement", "holds", "evidence"]
-    rows = [[c.id, c.section, c.statement, c.verdict, c.evidence] for c in claims]
-    table = out / "claims.csv"
-    pd.DataFrame(rows, columns=columns).to_csv(table, index=False, lineterminator="\n")
-    page = out / "claims.md"
-    page.write_text(_page(claims), encoding="utf-8")
-    return [table, page]
-
-
-def _page(claims: list[Claim]) -> str:
-    count = {v: sum(c.verdict == v for c in claims) for v in ("yes", "no", "undecided")}
-    undecided = f", {count['undecided']} are undecided" if count["undecided"] else ""
-    summary = f"{count['yes']} of {len(claims)} hold on this robot{undecided}."
-    lines = ["# Claims", "", summary, ""]
-    lines += ["| section | statement | holds | evidence |", "|---|---|---|---|"]
-    for c in claims:
-        cells = (c.section, c.statement, "yes" if c.holds else f"**{c.verdict}**", c.evidence)
-        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    return "\n".join(lines) + "\n"
 
 
 def _stem(made: Item, suffix: str) -> str:

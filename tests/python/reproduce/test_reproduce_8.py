@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from axisight.cli import app
 from axisight.errors import InputError
 from axisight.frf import errors, robot_loop
-from axisight_thesis import Claim, Item, context, item, item_names, registered, run, write_claims
+from axisight_thesis import Item, context, item, item_names, registered, run
 from axisight_thesis.appendix_a import STOCHASTIC_FIGURES, stochastic_experiments
 from axisight_thesis.chapter8_compare import Ratios, except_for
 from axisight_thesis.chapter8_setting import (
@@ -210,23 +210,16 @@ def test_written_files(tmp_path):
     items = run("table-8.2", context(quick=True), tmp_path, lambda *state: seen.append(state))
     assert seen == [("table-8.2", 0, 1), ("done", 1, 1)]
     found = sorted(p.name for p in tmp_path.iterdir())
-    assert found == ["claims.csv", "claims.md", "table-8.2-layout.csv", "table-8.2.csv"]
+    assert found == [
+        "claims.csv",
+        "claims.json",
+        "claims.md",
+        "table-8.2-layout.csv",
+        "table-8.2.csv",
+    ]
     table = pd.read_csv(tmp_path / "table-8.2.csv")
     assert len(table) == 36
     assert items[0].claims[0].statement in (tmp_path / "claims.md").read_text()
-
-
-def test_claims_page(tmp_path):
-    claims = [
-        Claim("b", "8.4", "One.", False, "|dG| 3"),
-        Claim("a", "8.3.1", "Two.", True, "4"),
-    ]
-    write_claims(claims, tmp_path)
-    page = (tmp_path / "claims.md").read_text().splitlines()
-    assert page[2] == "1 of 2 hold on this robot."
-    assert page[6:] == [r"| 8.3.1 | Two. | yes | 4 |", r"| 8.4 | One. | **no** | \|dG\| 3 |"]
-    table = pd.read_csv(tmp_path / "claims.csv")
-    assert list(table["holds"]) == ["yes", "no"]
 
 
 def test_command(tmp_path):

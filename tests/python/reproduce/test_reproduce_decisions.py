@@ -3,12 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from scipy import stats
 
-from axisight_thesis import Claim, Item, write_claims, write_item
+from axisight_thesis import Item, write_item
 from axisight_thesis.chapter8_figures import error_item
 from axisight_thesis.chapter8_setting import Design, excited_lines
 from axisight_thesis.chapter8_study import Experiments
@@ -40,14 +39,6 @@ def test_one_value_decides_nothing_and_equal_ones_do():
 )
 def test_several_verdicts(verdicts, expected):
     assert all_of(verdicts) is expected
-
-
-def test_claims_say_undecided(tmp_path):
-    claims = [Claim(str(v), "1", "x", v, "y") for v in (True, False, None)]
-    table, page = write_claims(claims, tmp_path)
-    assert list(pd.read_csv(table)["holds"]) == ["yes", "no", "undecided"]
-    assert "1 of 3 hold on this robot, 1 are undecided." in page.read_text()
-    assert "**undecided**" in page.read_text()
 
 
 def test_quick_writes_one_small_picture(tmp_path):
