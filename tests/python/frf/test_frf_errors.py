@@ -327,7 +327,7 @@ def test_one_realization_cannot_be_averaged(robot):
 
 def test_example_of_the_page(repository):
     """The page's last snippet runs, and T2 pays for ripple in the rows of axis 1's column."""
-    page = (repository / "docs" / "reproduce.md").read_text(encoding="utf-8")
+    page = (repository / "docs" / "predicted_errors.md").read_text(encoding="utf-8")
     snippet = page.rsplit("```python\n", 1)[1].split("```", 1)[0]
     names = {}
     exec(snippet, names)
