@@ -1,16 +1,14 @@
 """Fitting robot and effect parameters to logs."""
 
-from axisight.fitting.simulation_error import (
+from axisight.fitting.parameters import (
     PRIOR_REACH,
-    FitOptions,
-    Fitted,
     Parameter,
-    Weighting,
     effect_parameter,
-    fit,
     robot_parameter,
     robot_parameters,
 )
+from axisight.fitting.simulation_error import FitOptions, Fitted, fit
+from axisight.fitting.weighting import Weighting
 
 __all__ = [
     "PRIOR_REACH",

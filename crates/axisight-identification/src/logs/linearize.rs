@@ -101,6 +101,13 @@ fn check(parameters: &[FitParameter]) -> Result<(), ProblemError> {
                 got: format!("{p:?}"),
             });
         }
+        if p.logarithmic && p.lower <= 0.0 {
+            return Err(ProblemError::Invalid {
+                field: format!("parameters[{i}].lower"),
+                expected: "above zero, as the logarithm is searched".into(),
+                got: p.lower.to_string(),
+            });
+        }
     }
     Ok(())
 }
@@ -113,6 +120,7 @@ pub(super) fn limits(parameters: &[FitParameter], free: &[usize]) -> Limits {
         upper: each(|p| p.upper),
         scale: each(|p| p.scale),
         reach: Reach::Bounds,
+        logarithmic: free.iter().map(|i| parameters[*i].logarithmic).collect(),
     }
 }
 

@@ -39,6 +39,8 @@ pub struct FitParameter {
     /// Whether its sensitivity changes little. Its column is then computed once, or taken from an
     /// earlier fit, and renewed only on request.
     pub nuisance: bool,
+    /// Whether its logarithm is searched. Its lower bound is then above zero.
+    pub logarithmic: bool,
 }
 
 /// Residuals with some columns of their Jacobian.
