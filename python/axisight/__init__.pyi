@@ -47,6 +47,8 @@ from .fitting import (
     fit,
     robot_parameter,
     robot_parameters,
+    simulation_residuals,
+    spectral_weighting,
 )
 from .frf.plots import (
     plot_bode,
@@ -59,6 +61,7 @@ from .gap import (
 )
 from .logs import (
     Case,
+    Load,
     Log,
     check_log,
     read_case,
@@ -99,6 +102,7 @@ __all__ = [
     "FitOptions",
     "Fitted",
     "InputError",
+    "Load",
     "Log",
     "LogError",
     "Parameter",
@@ -145,6 +149,8 @@ __all__ = [
     "signal_files",
     "simulate",
     "simulate_batch",
+    "simulation_residuals",
+    "spectral_weighting",
     "to_mujoco",
     "to_pinocchio",
     "write_back",

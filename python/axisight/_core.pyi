@@ -690,6 +690,7 @@ _PoseResponse: TypeAlias = tuple[
     NDArray[np.complex128] | None,
     NDArray[np.complex128] | None,
     int,
+    Sequence[tuple[int, int, float]],
 ]
 
 @final

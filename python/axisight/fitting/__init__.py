@@ -7,7 +7,9 @@ from axisight.fitting.parameters import (
     robot_parameter,
     robot_parameters,
 )
+from axisight.fitting.residuals import simulation_residuals
 from axisight.fitting.simulation_error import FitOptions, Fitted, fit
+from axisight.fitting.spectral_weighting import spectral_weighting
 from axisight.fitting.weighting import Weighting
 
 __all__ = [
@@ -20,4 +22,6 @@ __all__ = [
     "fit",
     "robot_parameter",
     "robot_parameters",
+    "simulation_residuals",
+    "spectral_weighting",
 ]

@@ -16,6 +16,7 @@ from axisight.display.summary import summarized
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.fitting.divergence import Diverged
+from axisight.fitting.loads import with_loads
 from axisight.fitting.parameters import Parameter, core_spec, with_search
 from axisight.fitting.weighting import Weighting
 from axisight.logs import Log
@@ -109,6 +110,7 @@ def fit(
     *,
     effects: Iterable[Effect] = (),
     weighting: Weighting | None = None,
+    joint_weighting: Weighting | None = None,
     options: FitOptions | None = None,
 ) -> Fitted:
     """Fit parameters to several logs together, and return values with standard errors.
@@ -116,29 +118,86 @@ def fit(
     If the robot has a velocity controller and all logs have velocity references, the fit compares
     simulated and logged torque commands [Nm]. Otherwise the logged torque drives the simulation, and
     the fit compares motor positions [rad]. ``weighting`` and ``options`` have defaults.
+
+    With a ``joint_weighting`` (weights in 1/rad), the fit also compares the angles of the driven joints with
+    ``joint_position_rad`` of the logs. The zero of a joint encoder does not matter: its mean error over a log
+    is removed. Axes without an encoder (NaN) and logs without any are not compared.
+
+    A log may state its load (``load``). It replaces the robot's own effect ``payload`` in that log only.
+
     Effect parameters refer to positions in ``effects``. The robot's own effects act too; an effect in
     ``effects`` replaces the robot's own one with the same name and axis.
     Raises InputError for misuse, and for a start that cannot be simulated; non-convergence is a status.
     """
     chosen = options or FitOptions()
     added = robot.placed(effects)
-    closed = is_closed_loop(robot, logs)
-    ready = _core.SimulatedLogs(
-        robot.core,
-        records(logs, closed=closed),
-        (weighting or Weighting.flat(robot.n_axes)).core(),
-        input="reference" if closed else "torque",
-        output="torque" if closed else "position",
-        block_s=chosen.block_s,
-        integrator=chosen.integrator,
+    ready, every = simulated_logs(
+        robot,
+        logs,
+        added,
+        weighting=weighting,
+        joint_weighting=joint_weighting,
+        options=chosen,
     )
-    result = ready.fit(core_effects(added), [core_spec(with_search(p), added) for p in parameters], chosen)
+    specs = [core_spec(with_search(p), added) for p in parameters]
+    result = ready.fit(core_effects(every), specs, chosen)
     if isinstance(result, Diverged):
         raise InputError(
             f"parameters: expected initial values that can be simulated, got some where {result}; "
             "start nearer to the machine, or integrate in smaller steps"
         )
     return fitted(result, parameters, added)
+
+
+def simulated_logs(
+    robot: Robot,
+    logs: Sequence[Log],
+    effects: Sequence[Effect],
+    *,
+    weighting: Weighting | None = None,
+    joint_weighting: Weighting | None = None,
+    options: FitOptions,
+) -> tuple[_core.SimulatedLogs, list[Effect]]:
+    """Return the logs ready for fits, and ``effects`` with a payload if logs state their load.
+
+    Arguments are those of `fit`, with ``effects`` placed. Raises InputError as `fit`.
+    """
+    closed = is_closed_loop(robot, logs)
+    every, own = with_loads(robot, effects, [log.load for log in logs])
+    joints = None if joint_weighting is None else joint_angles(logs)
+    ready = _core.SimulatedLogs(
+        robot.core,
+        records(logs, closed=closed),
+        (weighting or Weighting.flat(robot.n_axes)).core(),
+        input="reference" if closed else "torque",
+        output="torque" if closed else "position",
+        joint=joints or [],
+        joint_weighting=[] if joint_weighting is None else joint_weighting.core(),
+        own=own,
+        block_s=options.block_s,
+        integrator=options.integrator,
+    )
+    return ready, every
+
+
+def joint_angles(logs: Sequence[Log]) -> list[Array | None]:
+    """Return the joint encoders of each log (lead + n, n_axes) [rad], None for a log without one.
+
+    Raises InputError if no log has a joint encoder.
+    """
+    if all(log.joint_position_rad is None for log in logs):
+        raise InputError(
+            "joint_weighting: expected logs with joint_position_rad (columns joint_position_N), got none"
+        )
+    out: list[Array | None] = []
+    for log in logs:
+        angles = log.joint_position_rad
+        if angles is not None:
+            # Samples of the run-up are not compared.
+            before = np.zeros((log.lead, log.n_axes))
+            angles = np.ascontiguousarray(np.concatenate([before, angles]))
+        out.append(angles)
+    return out
 
 
 def is_closed_loop(robot: Robot, logs: Sequence[Log]) -> bool:

@@ -120,7 +120,6 @@ fn predicted_torques_tell_them_apart() {
                 certainty: vec![1.0; SAMPLES],
             })],
             weighting: vec![flat(1.0)],
-            joint_weighting: Vec::new(),
             block_s: 0.05,
         };
         problem

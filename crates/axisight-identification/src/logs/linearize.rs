@@ -142,7 +142,10 @@ pub(super) fn grams<P: Problem>(
 ) -> (f64, Vec<BlockGram>) {
     let (losses, weight): (Vec<f64>, Vec<f64>) = residual.iter().map(|r| loss.evaluate(*r)).unzip();
     let columns: Vec<&[f64]> = columns.iter().map(|c| &c[..]).collect();
-    let scale: Vec<f64> = free.iter().map(|i| parameters[*i].scale).collect();
+    let scale: Vec<f64> = free
+        .iter()
+        .map(|i| parameters[*i].natural_change())
+        .collect();
     let blocks = problem.blocks().into_par_iter();
     let blocks = blocks.map(|block| {
         let range = block.start..block.start + block.len;

@@ -43,6 +43,23 @@ pub struct FitParameter {
     pub logarithmic: bool,
 }
 
+/// Natural change of a parameter whose logarithm is searched, as a share of its value.
+///
+/// Doubling a stiffness changes the torques of a precise log by thousands of standard deviations of
+/// its noise. No chaos is needed for that.
+const SMALL_SHARE: f64 = 0.01;
+
+impl FitParameter {
+    /// The change by which the sensitivity of residuals is judged.
+    pub(super) fn natural_change(&self) -> f64 {
+        if self.logarithmic {
+            SMALL_SHARE * self.initial
+        } else {
+            self.scale
+        }
+    }
+}
+
 /// Residuals with some columns of their Jacobian.
 #[derive(Debug, Clone)]
 pub struct Evaluation {
