@@ -32,6 +32,8 @@ PASSES = 3
 """Largest number of fits; each weights its residuals by the spectrum of those before."""
 _SETTLED = 0.05
 """The weights have settled when the loss per residual is within this share of one."""
+_SMALL_CHANGE = 0.02
+"""Natural change of a Coulomb friction, relative to the typical one."""
 _FIRST_TOLERANCE = 1e-4
 """Share of the loss by which a pass that is not the last has to go on falling."""
 
@@ -137,10 +139,13 @@ def _parameters(
     found: Fitted | None,
 ) -> list[Parameter]:
     """Return the parameters to fit, at the values of the robot, the effects and the last fit."""
+    given = {one.effect for one in more}
     out = [robot_parameter(robot, name) for name in names]
     for place, effect in enumerate(effects):
-        if effect.name == "coulomb_friction":
-            out.append(effect_parameter(effects, place, "coulomb_nm"))
+        if effect.name == "coulomb_friction" and place not in given:
+            size = effect_parameter(effects, place, "coulomb_nm")
+            # A change of the whole friction is thousands of deviations of noise, without chaos.
+            out.append(replace(size, scale=_SMALL_CHANGE * size.scale))
     known = {} if found is None else dict(zip(found.names, found.values, strict=True))
     for one in more:
         name = one.name if one.effect is None else f"{effects[one.effect].label}.{one.name}"

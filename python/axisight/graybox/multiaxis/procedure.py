@@ -20,7 +20,7 @@ from axisight.graybox.multiaxis.findings import between_steps
 from axisight.graybox.multiaxis.joint_step import JointStep, check_logs, joint_step
 from axisight.graybox.multiaxis.operating_points import operating_points
 from axisight.graybox.multiaxis.report import report
-from axisight.graybox.multiaxis.rigid_step import RigidStep, rigid_step
+from axisight.graybox.multiaxis.rigid_step import DRY_FRICTION, RigidStep, rigid_step
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -80,6 +80,7 @@ def identify_robot(
     slow: Sequence[Log] = (),
     parameters: Sequence[str | Parameter] = USUAL_PARAMETERS,
     effects: Sequence[Effect] = (),
+    coulomb: bool = True,
     bodies: bool = False,
     responses: bool = True,
     period_s: float | None = None,
@@ -106,7 +107,8 @@ def identify_robot(
     slow : slow motions in both directions, for step 1.
     parameters : robot parameters to fit, by name or pattern (``axis*.stiffness``), and
         :class:`axisight.Parameter` for step 3, of the robot or of ``effects``.
-    effects : further effects of the model in step 3; step 1 adds Coulomb frictions behind them.
+    effects : further effects of the model in step 3.
+    coulomb : whether the model gets a Coulomb friction on every axis that has no dry friction yet.
     bodies : whether step 1 replaces masses and inertias.
     responses : whether to perform step 2. Without it, step 3 starts from the robot's values.
     period_s, lines, drop_periods : excitation, see :func:`axisight.records.prepare_records`.
@@ -124,15 +126,17 @@ def identify_robot(
     check_logs(robot, [*calm, *given])
     names, more = _chosen(robot, parameters)
     logs = [*calm, *given]
-    first = rigid_step(robot, calm, bodies=bodies, cutoff_hz=cutoff_hz)
+    first = rigid_step(robot, calm, given, bodies=bodies, cutoff_hz=cutoff_hz)
     found, lost = (
         operating_points(robot, given, period_s=period_s, lines=lines, drop_periods=drop_periods)
         if responses
         else ([], [])
     )
     second = elastic_step(first.robot, found, names, seed=seed)
-    own = [e.label for e in effects]
-    acting = [*robot.placed(effects), *(e for e in first.effects if e.label not in own)]
+    acting = robot.placed(effects)
+    rubbing = {e.axis for e in (*robot.effects, *acting) if e.name in DRY_FRICTION}
+    if coulomb:
+        acting += [e for e in first.effects if e.axis not in rubbing]
     third = joint_step(second.robot, logs, names, acting, more, options=options or FitOptions())
     findings = (
         *first.findings,
