@@ -28,6 +28,7 @@ from axisight.graybox.multiaxis import (
     OperatingPoint,
     RigidStep,
     RobotIdentification,
+    identified_robot,
     identify_robot,
 )
 from axisight.graybox.multistart import AxisMultistart, multistart_axis
@@ -84,6 +85,7 @@ __all__ = [
     "high_frequency_gain",
     "identified_axis",
     "identify_axis",
+    "identified_robot",
     "identify_robot",
     "initial_flexibility",
     "initial_model",

@@ -144,7 +144,7 @@ def identify_robot(
         *(text for point in found for text in point.findings),
         *second.findings,
         *third.findings,
-        *between_steps(second, third),
+        *between_steps(second, third, [log.name for log in logs]),
     )
     return RobotIdentification(
         first, second, third, tuple(log.name for log in logs), tuple(dict.fromkeys(findings))

@@ -33,13 +33,14 @@ class RigidStep:
     """Result of step 1.
 
     ``regression`` is the rigid-body identification, None without slow logs. ``robot`` has the viscous
-    friction found, and on request the bodies. ``effects`` are the Coulomb frictions of the axes, of zero size
+    friction found, and with ``bodies`` also masses and inertias. ``effects`` are the Coulomb frictions of the axes, of zero size
     without slow logs.
     """
 
     regression: LogIdentification | None
     robot: Robot
     effects: tuple[Effect, ...]
+    bodies: bool
     findings: tuple[str, ...]
 
 
@@ -60,7 +61,7 @@ def rigid_step(
     corner = friction_corner(np.max([_top_speed(log) for log in (*slow, *broadband)], axis=0))
     if not slow:
         text = "no slow log: friction starts at the robot's values; record slow motions both ways"
-        return RigidStep(None, robot, _coulomb(corner, np.zeros(robot.n_axes)), (text,))
+        return RigidStep(None, robot, _coulomb(corner, np.zeros(robot.n_axes)), False, (text,))
     with warnings.catch_warnings():
         # The findings say the same.
         warnings.simplefilter("ignore", IdentificationWarning)
@@ -82,6 +83,7 @@ def rigid_step(
         found,
         machine.with_parameters({n: v for n, v in drag.items() if v is not None and v > 0}),
         _coulomb(corner, np.maximum(dry, 0.0)),
+        bodies,
         tuple(findings),
     )
 
