@@ -44,7 +44,9 @@ def multiaxis_command(
     ],
     slow: Annotated[
         list[Path] | None,
-        typer.Option(metavar="LOG", help="Log of slow motions both ways, for friction (repeatable)."),
+        typer.Option(
+            metavar="LOG", help="Log of slow motions both ways, for friction (repeatable)."
+        ),
     ] = None,
     parameters: Annotated[
         list[str] | None,
@@ -144,9 +146,7 @@ def multiaxis_command(
         if out is not None:
             fitted = list(found.joint.fit.names)
             source = provenance("multiaxis", files, options(ctx) | {"parameters": fitted}, columns)
-            write_robot(
-                machine, out, axisight.graybox.identified_robot(found, source), force=force
-            )
+            write_robot(machine, out, axisight.graybox.identified_robot(found, source), force=force)
         if found.status not in _CONVERGED:
             raise typer.Exit(1)
 

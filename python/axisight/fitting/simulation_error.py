@@ -274,8 +274,30 @@ def _warnings(result: _core.FitResult, at_bound: Sequence[str]) -> list[str]:
         out.append(STATUS_ADVICE[result.status] + remedy)
     if at_bound:
         out.append(f"on a bound: {', '.join(at_bound)}")
+    dropped = _dropped_blocks(result)
+    if dropped:
+        out.append(
+            f"{100 * dropped:.2g} % of the data blocks took no part in the search, because a natural change of "
+            "a parameter changes them a thousand times more than noise: they are chaotic (contact, stiction), "
+            "or the weights or the scale of a parameter are too large"
+        )
     if result.condition > _POOR_CONDITION:
         out.append(
             f"condition number {result.condition:.1e}: the data hardly separates some parameters"
         )
     return out
+
+
+def _dropped_blocks(result: _core.FitResult) -> float:
+    """Return the share of blocks that the fit counts in the loss but not in the derivatives."""
+    if not result.free or not result.blocks:
+        return 0.0
+    empty = ~np.any(result.block_matrix, axis=(1, 2)) & (result.block_loss > 0)
+    if not empty.any():
+        return 0.0
+    moved = result.jacobian
+    cut = [
+        bool(lost and moved[:, start : start + n].any())
+        for lost, (_, _, start, n) in zip(empty, result.blocks, strict=True)
+    ]
+    return float(np.mean(cut))

@@ -13,8 +13,8 @@ from axisight.fitting.weighting import Weighting
 
 Array = NDArray[np.float64]
 
-_LEAST_LINES = 8
-"""Periodogram lines of a band; a mean of fewer scatters by more than a third."""
+_LEAST_LINES = 16
+"""Periodogram lines of a band; the root of their mean scatters by an eighth."""
 
 
 def spectral_weighting(

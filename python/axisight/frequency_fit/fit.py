@@ -63,7 +63,8 @@ def fit_responses(
         and within a factor of 100 unless bounds are given.
     effects
         Effects that leave the robot linear: payload, joint_stiffness, joint_damping, motor_inertia.
-        A response with a ``load`` has its own payload. Effects replace the robot's own effects of the same name and axis; its other effects act too.
+        A response with a ``load`` has its own payload. Effects replace the robot's own effects of the
+        same name and axis; its other effects act too.
     options
         See :class:`FrequencyFitOptions`.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,13 +37,15 @@ class ElasticStep:
     """Result of step 2.
 
     ``points`` are the operating points, ``fit`` is the best fit to their responses (None without responses),
-    ``robot`` has its values except for friction, and ``start`` says where the best search began.
+    ``robot`` has its values except for friction, and ``start`` says where the best search began. ``others`` are
+    robots from which step 3 may start again, if it ends at a wrong minimum.
     """
 
     points: tuple[OperatingPoint, ...]
     fit: FrequencyFit | None
     robot: Robot
     start: str
+    others: tuple[Robot, ...]
     findings: tuple[str, ...]
 
 
@@ -57,7 +60,7 @@ def elastic_step(
     """
     wanted = [name for name in names if name.rpartition(".")[2] in QUANTITIES]
     if not wanted or not points:
-        return ElasticStep(tuple(points), None, robot, "none", ())
+        return ElasticStep(tuple(points), None, robot, "none", (), ())
     responses = [point.response for point in points]
     linear = [e for e in robot.effects if effect_info(e.name).linear == "parameters"]
     model = robot.with_effects(linear)
@@ -75,17 +78,25 @@ def elastic_step(
         return fit_responses(model, responses, {**start, **drag}, options=options)
 
     found = {"the robot's values, or random ones around": search(searched, 1 + STARTS)}
-    try:
+    # If the arm has no equilibrium at the values that were read off, the other starts are left.
+    with suppress(InputError):
         found["the responses"] = search(read_off(robot, responses, searched), 1)
-    except InputError:
-        # The arm has no equilibrium at values that were read off: the other starts are left.
-        pass
-    start, fit = min(found.items(), key=lambda pair: pair[1].loss)
-    values = {n: float(v) for n, v in zip(fit.names, fit.values, strict=True) if n not in drag}
+    ranked = sorted(found.items(), key=lambda pair: pair[1].loss)
+    start, fit = ranked[0]
+
+    def with_values(one: FrequencyFit) -> Robot:
+        pairs = zip(one.names, one.values.tolist(), strict=True)
+        return robot.with_parameters({n: v for n, v in pairs if n not in drag})
+
     # Step 2 gives starts: only a search that did not end puts them in doubt.
     findings = [f"step 2: {STATUS_ADVICE[fit.status]}"] if fit.status in STATUS_ADVICE else []
     return ElasticStep(
-        tuple(points), fit, robot.with_parameters(values), start, tuple(findings)
+        points=tuple(points),
+        fit=fit,
+        robot=with_values(fit),
+        start=start,
+        others=(*(with_values(one) for _, one in ranked[1:]), robot),
+        findings=tuple(findings),
     )
 
 

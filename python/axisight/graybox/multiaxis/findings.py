@@ -7,12 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from axisight.graybox.multiaxis.elastic_step import ElasticStep
-from axisight.graybox.multiaxis.joint_step import JointStep
+from axisight.graybox.multiaxis.joint_step import POOR_PERCENT, JointStep
 
 _FAR = 0.3
 """Share of a stiffness or motor inertia by which step 3 may move it."""
-_POOR_PERCENT = 80.0
-"""Fit of a log below which a model misses something that is larger than noise [%]."""
 _UNKNOWN = 0.5
 """Standard error over value from which a parameter counts as unknown."""
 
@@ -27,7 +25,7 @@ def between_steps(elastic: ElasticStep, joint: JointStep, logs: Sequence[str]) -
                 f"{name}: the standard error is {share:.0f} % of the value: the logs do not determine it; "
                 "excite it more, or leave it out"
             )
-    if float(np.min(joint.fit_percent)) < _POOR_PERCENT:
+    if float(np.min(joint.fit_percent)) < POOR_PERCENT:
         out += _poor(elastic, joint, logs)
     return out
 

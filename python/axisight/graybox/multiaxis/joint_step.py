@@ -60,6 +60,32 @@ class JointStep:
     findings: tuple[str, ...]
 
 
+POOR_PERCENT = 80.0
+"""Fit of a log below which a model misses something that is larger than noise [%]."""
+
+
+def best_joint_step(
+    starts: Sequence[Robot],
+    logs: Sequence[Log],
+    names: Sequence[str],
+    effects: Sequence[Effect],
+    more: Sequence[Parameter],
+    *,
+    options: FitOptions,
+) -> JointStep:
+    """Return :func:`joint_step` from the first of ``starts`` that explains all logs, or else the best.
+
+    A simulation has other minima where a resonance of the model lies on another one of the arm.
+    """
+    found: list[JointStep] = []
+    for robot in starts:
+        one = joint_step(robot, logs, names, effects, more, options=options)
+        found.append(one)
+        if one.fit_percent.min() > POOR_PERCENT:
+            break
+    return max(found, key=lambda one: float(one.fit_percent.mean()))
+
+
 def joint_step(
     robot: Robot,
     logs: Sequence[Log],
@@ -126,7 +152,9 @@ def _weightings(
     if residuals[0].shape[1] == n:
         return motors, None
     measured = [
-        r[:, n:] for r, log in zip(residuals, logs, strict=True) if log.joint_position_rad is not None
+        r[:, n:]
+        for r, log in zip(residuals, logs, strict=True)
+        if log.joint_position_rad is not None
     ]
     return motors, spectral_weighting(measured, step)
 

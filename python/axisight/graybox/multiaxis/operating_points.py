@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from axisight.arguments import counted
 from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.frequency_fit import MeasuredResponse
@@ -55,7 +56,7 @@ def operating_points(
         names = tuple(log.name for log in group)
         if len(group) < robot.n_axes:
             findings.append(
-                f"{', '.join(names)}: {len(group)} logs at this pose, and a response needs {robot.n_axes}: "
+                f"{', '.join(names)}: {counted(len(group), 'log')} at this pose, and a response needs {robot.n_axes}: "
                 "used in step 3 only"
             )
             continue
@@ -92,9 +93,7 @@ def _point(
     drop_periods: int | None,
 ) -> OperatingPoint:
     try:
-        prepared = prepare_records(
-            logs, period_s=period_s, lines=lines, drop_periods=drop_periods
-        )
+        prepared = prepare_records(logs, period_s=period_s, lines=lines, drop_periods=drop_periods)
         data: xr.Dataset = mfrf(prepared.records, quantity="acceleration")
     except InputError as error:
         raise InputError(f"{', '.join(names)}: {error}") from None

@@ -17,7 +17,7 @@ from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter
 from axisight.graybox.multiaxis.elastic_step import ElasticStep, elastic_step
 from axisight.graybox.multiaxis.findings import between_steps
-from axisight.graybox.multiaxis.joint_step import JointStep, check_logs, joint_step
+from axisight.graybox.multiaxis.joint_step import JointStep, best_joint_step, check_logs
 from axisight.graybox.multiaxis.operating_points import operating_points
 from axisight.graybox.multiaxis.report import report
 from axisight.graybox.multiaxis.rigid_step import DRY_FRICTION, RigidStep, rigid_step
@@ -137,7 +137,14 @@ def identify_robot(
     rubbing = {e.axis for e in (*robot.effects, *acting) if e.name in DRY_FRICTION}
     if coulomb:
         acting += [e for e in first.effects if e.axis not in rubbing]
-    third = joint_step(second.robot, logs, names, acting, more, options=options or FitOptions())
+    third = best_joint_step(
+        [second.robot, *second.others],
+        logs,
+        names,
+        acting,
+        more,
+        options=options or FitOptions(),
+    )
     findings = (
         *first.findings,
         *lost,

@@ -34,7 +34,9 @@ def report(
     lines = [*_rigid(rigid), "", *_elastic(elastic), "", *_joint(elastic, joint), ""]
     lines.append("Fit (3.54) of each log, axis by axis, before step 3 -> after")
     rows = zip(logs, joint.initial_fit_percent, joint.fit_percent, strict=True)
-    lines += [f"  {name}: {_percents(before)} -> {_percents(after)} %" for name, before, after in rows]
+    lines += [
+        f"  {name}: {_percents(before)} -> {_percents(after)} %" for name, before, after in rows
+    ]
     if findings:
         lines += ["", "Findings", *[f"  - {text}" for text in findings]]
     return "\n".join(lines)
@@ -64,7 +66,9 @@ def _elastic(step: ElasticStep) -> list[str]:
     out = [f"Step 2: frequency responses at {len(step.points)} operating points"]
     for point in step.points:
         pose = ", ".join(f"{angle:.3f}" for angle in point.response.joint_angle_rad)
-        out.append(f"  ({pose}) rad, {len(point.response.frequency_hz)} lines: {', '.join(point.logs)}")
+        out.append(
+            f"  ({pose}) rad, {len(point.response.frequency_hz)} lines: {', '.join(point.logs)}"
+        )
     kept = step.robot.parameters()
     for name, value, std in zip(step.fit.names, step.fit.values, step.fit.std, strict=True):
         if kept[name] == value:

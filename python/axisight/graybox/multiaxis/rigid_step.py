@@ -22,7 +22,12 @@ from axisight.robot_file.document import render
 
 Real = NDArray[np.float64]
 
-DRY_FRICTION = ("coulomb_friction", "stribeck_friction", "presliding_friction", "directional_friction")
+DRY_FRICTION = (
+    "coulomb_friction",
+    "stribeck_friction",
+    "presliding_friction",
+    "directional_friction",
+)
 """Effects beside which an axis needs no Coulomb friction of its own."""
 _OF_DRIVES = ("motor_inertia", "viscous_friction", "coulomb_friction", "torque_offset")
 
@@ -33,8 +38,8 @@ class RigidStep:
     """Result of step 1.
 
     ``regression`` is the rigid-body identification, None without slow logs. ``robot`` has the viscous
-    friction found, and with ``bodies`` also masses and inertias. ``effects`` are the Coulomb frictions of the axes, of zero size
-    without slow logs.
+    friction found, and with ``bodies`` also masses and inertias. ``effects`` are the Coulomb frictions of the
+    axes, of zero size without slow logs.
     """
 
     regression: LogIdentification | None

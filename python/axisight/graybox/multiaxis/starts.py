@@ -8,14 +8,15 @@ import numpy as np
 
 from axisight.logs import Log
 from axisight.robot import Robot
+
 _ROUNDS = 3
 
 
 def from_its_start(robot: Robot, log: Log) -> Log:
     """Return the log with the driven joint angles at its start, if it does not state them.
 
-    They follow from the first motor position and, by the present model, the deflection of the gears under gravity there. The noise
-    of one reading does not matter, as a gear divides it by its ratio.
+    They follow from the first motor position and, by the present model, the deflection of the gears under
+    gravity there. The noise of one reading does not matter, as a gear divides it by its ratio.
     """
     if log.start_rad is not None:
         return log
@@ -28,7 +29,9 @@ def from_its_start(robot: Robot, log: Log) -> Log:
     return replace(log, start_rad=angle)
 
 
-def mean_angle(robot: Robot, log: Log, kept_s: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def mean_angle(
+    robot: Robot, log: Log, kept_s: float
+) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Return the mean driven joint angles (n_axes,) [rad] over the last ``kept_s`` [s] of a log."""
     count = max(1, round(kept_s / log.sample_time_s))
     mean = log.position_rad[-count:].mean(axis=0) * robot.gear_ratio
