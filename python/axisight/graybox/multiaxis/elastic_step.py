@@ -17,6 +17,7 @@ from axisight.frequency_fit import (
     MeasuredResponse,
     fit_responses,
 )
+from axisight.frequency_fit.options import Criterion
 from axisight.frequency_fit.result import STATUS_ADVICE
 from axisight.graybox.multiaxis.operating_points import OperatingPoint
 from axisight.robot import Robot
@@ -69,7 +70,7 @@ def elastic_step(
     drag = {f"{joint}.viscous_friction": 0.0 for joint in robot.axis_names}
     drag = {name: _positive(own[name]) for name in drag}
     weighted = all(r.variance is not None for r in responses)
-    criterion = "weighted_log_least_squares" if weighted else "log_least_squares"
+    criterion: Criterion = "weighted_log_least_squares" if weighted else "log_least_squares"
 
     def search(start: Mapping[str, float], starts: int) -> FrequencyFit:
         options = FrequencyFitOptions(

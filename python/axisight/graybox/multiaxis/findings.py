@@ -32,7 +32,7 @@ def between_steps(elastic: ElasticStep, joint: JointStep, logs: Sequence[str]) -
 
 def _poor(elastic: ElasticStep, joint: JointStep, logs: Sequence[str]) -> list[str]:
     """Return what a poor fit says; a good one shows that step 2 was no more than a start."""
-    log, axis = np.unravel_index(int(np.argmin(joint.fit_percent)), joint.fit_percent.shape)
+    log, axis = divmod(int(np.argmin(joint.fit_percent)), joint.fit_percent.shape[1])
     out = [
         f"{logs[log]}, axis {axis + 1}: the model explains {joint.fit_percent[log, axis]:.0f} % only: an effect "
         "is missing, the search ended far from the machine, or the axis hardly moves there"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from axisight.arguments import counted
+from axisight.arguments import Lines, counted
 from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.frequency_fit import MeasuredResponse
@@ -41,7 +41,7 @@ def operating_points(
     logs: Sequence[Log],
     *,
     period_s: float | None = None,
-    lines: Sequence[int] | None = None,
+    lines: Sequence[int] | Lines | None = None,
     drop_periods: int | None = None,
 ) -> tuple[list[OperatingPoint], list[str]]:
     """Return the operating points of broadband logs, and findings on logs that give no response.
@@ -89,7 +89,7 @@ def _point(
     logs: Sequence[Log],
     names: tuple[str, ...],
     period_s: float | None,
-    lines: Sequence[int] | None,
+    lines: Sequence[int] | Lines | None,
     drop_periods: int | None,
 ) -> OperatingPoint:
     try:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
-from axisight.arguments import did_you_mean, instance, several
+from axisight.arguments import Lines, did_you_mean, instance, several
 from axisight.display import html
 from axisight.display.summary import summarized
 from axisight.effects import Effect
@@ -84,7 +84,7 @@ def identify_robot(
     bodies: bool = False,
     responses: bool = True,
     period_s: float | None = None,
-    lines: Sequence[int] | None = None,
+    lines: Sequence[int] | Lines | None = None,
     drop_periods: int | None = None,
     cutoff_hz: float = 10.0,
     options: FitOptions | None = None,
@@ -134,9 +134,8 @@ def identify_robot(
     )
     second = elastic_step(first.robot, found, names, seed=seed)
     acting = robot.placed(effects)
-    rubbing = {e.axis for e in (*robot.effects, *acting) if e.name in DRY_FRICTION}
     if coulomb:
-        acting += [e for e in first.effects if e.axis not in rubbing]
+        acting += _missing_friction(robot, acting, first)
     third = best_joint_step(
         [second.robot, *second.others],
         logs,
@@ -156,6 +155,12 @@ def identify_robot(
     return RobotIdentification(
         first, second, third, tuple(log.name for log in logs), tuple(dict.fromkeys(findings))
     )
+
+
+def _missing_friction(robot: Robot, given: Sequence[Effect], first: RigidStep) -> list[Effect]:
+    """Return the Coulomb frictions of step 1 on axes that have no dry friction."""
+    rubbing = {e.axis for e in (*robot.effects, *given) if e.name in DRY_FRICTION}
+    return [e for e in first.effects if e.axis not in rubbing]
 
 
 def _chosen(

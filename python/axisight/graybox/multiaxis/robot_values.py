@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from axisight.arguments import instance
+from axisight.effects import Effect
 from axisight.graybox.multiaxis.procedure import RobotIdentification
 from axisight.robot_file import Identified, Provenance, identified
 from axisight.robot_file.values import noted
@@ -24,7 +25,7 @@ def identified_robot(found: RobotIdentification, provenance: Provenance) -> Iden
     fit = found.joint.fit
     values = dict(zip(fit.names, fit.values.tolist(), strict=True))
     errors = dict(zip(fit.names, fit.std.tolist(), strict=True))
-    removed = ()
+    removed: tuple[Effect, ...] = ()
     bodies: dict[str, float] = {}
     if found.rigid.bodies and found.rigid.regression is not None:
         step = found.rigid.regression.identified(provenance)
