@@ -144,8 +144,10 @@ def test_one_model_over_loads(loaded: list[Log]) -> None:
     start = off_by(1.3, 2, THIRTEEN)
     found = fit(ROBOT, loaded, parameters(start))
     assert found.status in ("loss_converged", "step_converged"), found.warnings
-    # Half a second at one pose leaves dampings to about one percent.
     wrong = errors(found.names, found.values)
+    # Half a second at one pose determines springs and rotors; a model without the loads is 10 % off.
+    firm = [not name.endswith("damping") for name in found.names]
+    assert np.abs(wrong[firm]).max() < 0.01
     assert (np.abs(wrong) < 4 * found.std / found.values + 2e-4).all()
 
 
