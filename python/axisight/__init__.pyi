@@ -52,6 +52,8 @@ from .fitting import (
     fit,
     robot_parameter,
     robot_parameters,
+    simulation_residuals,
+    spectral_weighting,
 )
 from .frf.plots import (
     plot_bode,
@@ -64,6 +66,7 @@ from .gap import (
 )
 from .logs import (
     Case,
+    Load,
     Log,
     check_log,
     read_case,
@@ -104,6 +107,7 @@ __all__ = [
     "FitOptions",
     "Fitted",
     "InputError",
+    "Load",
     "Log",
     "LogError",
     "Parameter",
@@ -151,6 +155,8 @@ __all__ = [
     "signal_files",
     "simulate",
     "simulate_batch",
+    "simulation_residuals",
+    "spectral_weighting",
     "to_mujoco",
     "to_pinocchio",
     "write_back",

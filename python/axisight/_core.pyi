@@ -259,6 +259,7 @@ class ParameterSpec(Protocol):
     the parameter's unit; ``scale`` is the natural size of a change. A ``nuisance`` parameter's
     Jacobian column is computed once and refreshed only after the search has settled.
     ``amplitude``: of a shape, the place of its effect's only size in that effect's table.
+    The logarithm of a ``logarithmic`` parameter is searched; its ``lower`` is above zero.
     """
 
     @property
@@ -281,6 +282,8 @@ class ParameterSpec(Protocol):
     def nuisance(self) -> bool: ...
     @property
     def amplitude(self) -> int | None: ...
+    @property
+    def logarithmic(self) -> bool: ...
 
 @type_check_only
 class OptionSpec(Protocol):
@@ -687,6 +690,7 @@ _PoseResponse: TypeAlias = tuple[
     NDArray[np.complex128] | None,
     NDArray[np.complex128] | None,
     int,
+    Sequence[tuple[int, int, float]],
 ]
 
 @final
@@ -850,6 +854,10 @@ class SimulatedLogs:
     factor on the weighted error of its sample, None for one everywhere. Every run begins at rest, at
     ``start`` (n_axes,) [rad], None for the operating point; the first ``lead`` samples of input and target,
     of which the certainty has none, are simulated and not compared. ``weighting`` has one entry per axis.
+    With ``joint_weighting``, one entry per axis, the angles of the driven joints are compared as well, with
+    ``joint`` [rad], shaped as the input, one per log; NaN on an axis, or None, for joints without an encoder.
+    The mean error of each joint over a log is removed. Joints count as further axes in the blocks. ``own``
+    are (effect, parameter, value), both from 0, that hold in one log only.
     ``block_s`` [s] is the length of the blocks of `FitResult.blocks`; ``integrator`` by default rk4 with one
     step a sample.
     """
@@ -862,6 +870,9 @@ class SimulatedLogs:
         *,
         input: Literal["reference", "torque", "tracking"] = "reference",
         output: Literal["torque", "position"] = "torque",
+        joint: Sequence[_Array | None] = ...,
+        joint_weighting: Sequence[_Weighting] = ...,
+        own: Sequence[Sequence[tuple[int, int, float]]] = ...,
         block_s: float = 1.0,
         integrator: IntegratorSpec | None = None,
     ) -> SimulatedLogs: ...

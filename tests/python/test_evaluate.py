@@ -7,14 +7,8 @@ import pytest
 
 from axisight import Effect, InputError, Robot, _core, load_robot
 from axisight.effects import core_effects
-from axisight.fitting.simulation_error import (
-    FitOptions,
-    Parameter,
-    Weighting,
-    core_spec,
-    effect_parameter,
-    robot_parameter,
-)
+from axisight.fitting import FitOptions, Parameter, Weighting, effect_parameter, robot_parameter
+from axisight.fitting.parameters import core_spec
 from axisight.simulation import simulate
 
 EFFECTS = [Effect("coulomb_friction", 1, {"coulomb_nm": 0.3, "smoothing_rad_s": 0.05})]

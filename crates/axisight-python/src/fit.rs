@@ -12,7 +12,8 @@ use crate::simulation::IntegratorSpec;
 use axisight_core::simulation::Method;
 use axisight_identification::logs::{
     Column as Shared, Courses as Runs, FitParameter, InverseDynamics, Linearization as Point,
-    MotionRecord, Problem, Record, SimulationErrorProblem, SimulationInput, SimulationOutput, fit,
+    MotionRecord, OwnValue, Problem, Record, SimulationErrorProblem, SimulationInput,
+    SimulationOutput, fit,
 };
 use axisight_numerics::descent::Status;
 use numpy::PyReadonlyArray2;
@@ -129,24 +130,41 @@ fn simulation_output(name: &str) -> PyResult<SimulationOutput> {
 #[pymethods]
 impl SimulatedLogs {
     #[new]
-    #[pyo3(signature = (robot, records, weighting, *, input="reference", output="torque", block_s=1.0, integrator=None))]
+    #[pyo3(signature = (robot, records, weighting, *, input="reference", output="torque", joint=Vec::new(), joint_weighting=Vec::new(), own=Vec::new(), block_s=1.0, integrator=None))]
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
     fn new(
         robot: &Robot,
         records: Vec<RecordTuple<'_>>,
         weighting: Vec<WeightingTuple>,
         input: &str,
         output: &str,
+        joint: Vec<Option<PyReadonlyArray2<'_, f64>>>,
+        joint_weighting: Vec<WeightingTuple>,
+        own: Vec<Vec<(usize, usize, f64)>>,
         block_s: f64,
         integrator: Option<IntegratorSpec>,
     ) -> PyResult<Self> {
         let robot = robot.description.clone();
         let n_axes = robot.n_axes();
-        let record = |(i, t, c, start, lead): RecordTuple<'_>| {
+        let values = |number: usize| {
+            let given = own.get(number).into_iter().flatten();
+            let value = |(effect, parameter, value): &(usize, usize, f64)| OwnValue {
+                effect: *effect,
+                parameter: *parameter,
+                value: *value,
+            };
+            given.map(value).collect()
+        };
+        let record = |(number, (i, t, c, start, lead)): (usize, RecordTuple<'_>)| {
             let certainty = c.map(|c| rows(&c, "certainty", n_axes));
+            let joint = joint.get(number).and_then(Option::as_ref);
+            let joint = joint.map(|j| rows(j, "joint", n_axes));
             Ok(Arc::new(Record {
                 input: rows(&i, "input", n_axes)?,
                 target: rows(&t, "target", n_axes)?,
                 certainty: certainty.transpose()?,
+                joint: joint.transpose()?,
+                own: values(number),
                 start,
                 lead,
             }))
@@ -155,10 +173,15 @@ impl SimulatedLogs {
         let bare = SimulationErrorProblem {
             effects: Vec::new(),
             parameters: Vec::new(),
-            records: records.into_iter().map(record).collect::<PyResult<_>>()?,
+            records: records
+                .into_iter()
+                .enumerate()
+                .map(record)
+                .collect::<PyResult<_>>()?,
             input: simulation_input(input)?,
             output: simulation_output(output)?,
             weighting: weightings(weighting),
+            joint_weighting: weightings(joint_weighting),
             method: integrator.map_or(Ok(each_sample), |i| i.method())?,
             block_s,
             courses: None,

@@ -22,6 +22,7 @@ pub struct ParameterSpec {
     nuisance: bool,
     /// For a shape: index of the only size parameter in the table of its effect.
     amplitude: Option<usize>,
+    logarithmic: bool,
 }
 
 /// Settings of a fit, from Python.
@@ -71,6 +72,7 @@ pub fn parameters(
                 frozen: s.frozen,
                 amplitude: size(s),
                 nuisance: s.nuisance,
+                logarithmic: s.logarithmic,
             })
         })
         .collect()

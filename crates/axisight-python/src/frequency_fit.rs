@@ -9,7 +9,7 @@ use axisight_identification::frequency::{
     Criterion, DesignOptions, FrequencyFit, FrequencyFitError, FrequencyOptions,
     FrequencyParameter, FrequencyProblem, Hold, PoseResponse, SearchOptions, Uncertainty, minimize,
 };
-use axisight_identification::logs::Loss;
+use axisight_identification::logs::{Loss, OwnValue};
 use numpy::{
     Complex64, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
 };
@@ -45,7 +45,8 @@ pub struct FrequencyOptionSpec {
 }
 
 /// One pose: joint angles, frequencies, response, variance, variance for the weights, covariance,
-/// reference of logarithmic weights, derivative order. Arrays over lines and elements are flat.
+/// reference of logarithmic weights, derivative order, effect parameters with own values (effect,
+/// parameter, value). Arrays over lines and elements are flat.
 type PoseTuple<'py> = (
     Vec<f64>,
     PyReadonlyArray1<'py, f64>,
@@ -55,11 +56,26 @@ type PoseTuple<'py> = (
     Option<PyReadonlyArray1<'py, Complex64>>,
     Option<PyReadonlyArray1<'py, Complex64>>,
     u8,
+    Vec<(usize, usize, f64)>,
 );
 
 fn pose(tuple: PoseTuple<'_>) -> PyResult<PoseResponse> {
-    let (joint_angle, frequency_hz, response, variance, weighing, covariance, reference, order) =
-        tuple;
+    let (
+        joint_angle,
+        frequency_hz,
+        response,
+        variance,
+        weighing,
+        covariance,
+        reference,
+        order,
+        own,
+    ) = tuple;
+    let value = |(effect, parameter, value)| OwnValue {
+        effect,
+        parameter,
+        value,
+    };
     let plain = |a: &PyReadonlyArray1<'_, f64>| a.as_array().to_vec();
     let complex = |a: &PyReadonlyArray1<'_, Complex64>| a.as_array().to_vec();
     let uncertainty = match (variance, weighing, covariance) {
@@ -83,6 +99,7 @@ fn pose(tuple: PoseTuple<'_>) -> PyResult<PoseResponse> {
         uncertainty,
         reference: reference.as_ref().map(complex),
         order,
+        own: own.into_iter().map(value).collect(),
     })
 }
 

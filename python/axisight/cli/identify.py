@@ -6,6 +6,7 @@ import typer
 
 from axisight.cli.identify_axis import axis_command
 from axisight.cli.identify_elastic import elastic_command
+from axisight.cli.identify_multiaxis import multiaxis_command
 from axisight.cli.identify_rigid import rigid_body_command
 
 identify_app = typer.Typer(
@@ -16,3 +17,4 @@ identify_app = typer.Typer(
 identify_app.command("rigid-body")(rigid_body_command)
 identify_app.command("axis")(axis_command)
 identify_app.command("elastic")(elastic_command)
+identify_app.command("multiaxis")(multiaxis_command)

@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 
 import axisight
 from axisight.cli.common import Columns, Force, errors, say
@@ -25,6 +23,7 @@ from axisight.cli.identify_common import (
     read_logs,
     write_robot,
 )
+from axisight.cli.lines import lines_of_band
 from axisight.cli.panels import EXCITATION, MODEL
 from axisight.cli.robot import axis_of
 from axisight.errors import InputError
@@ -180,7 +179,7 @@ def axis_command(
             noise_model=cast("NoiseKind", noise_model),
             closed_loop=not open_loop,
             period_s=period_s,
-            lines=_lines(band_hz, period_s),
+            lines=lines_of_band(band_hz, period_s),
             drop_periods=drop_periods,
             cutoff_hz=cutoff_hz,
             notch_band_hz=band("--notch-band-hz", notch_band_hz),
@@ -230,15 +229,3 @@ def _ratio(machine: Robot | None, given: float | None, axis: int) -> float:
         )
     # Motor-side data do not show the direction in which the joint turns.
     return abs(float(machine.gear_ratio[axis - 1]))
-
-
-def _lines(band_hz: str | None, period_s: float | None) -> NDArray[np.int64] | None:
-    limits = band("--band-hz", band_hz)
-    if limits is None:
-        return None
-    if period_s is None:
-        raise InputError("--band-hz: expected --period-s SECONDS beside it, got none")
-    low, high = (round(frequency * period_s) for frequency in limits)
-    if not 1 <= low <= high:
-        raise InputError(f"--band-hz: expected 0 < LOW <= HIGH, got {band_hz!r}")
-    return np.arange(low, high + 1, dtype=np.int64)

@@ -11,81 +11,19 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from axisight import _core
-from axisight.arguments import did_you_mean
 from axisight.display import html
 from axisight.display.summary import summarized
-from axisight.effects import Effect, core_effects, effect_info
+from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.fitting.divergence import Diverged
+from axisight.fitting.loads import with_loads
+from axisight.fitting.parameters import Parameter, core_spec, with_search
+from axisight.fitting.weighting import Weighting
 from axisight.logs import Log
 from axisight.robot import Robot
 from axisight.simulation import Integrator
 
 Array = NDArray[np.float64]
-
-
-@summarized
-@dataclass(frozen=True)
-class Parameter:
-    """One number to fit.
-
-    Without ``effect``, ``name`` is a robot parameter (``axis1.stiffness``; see `robot_parameters`).
-    Otherwise ``effect`` is the position of an effect in the list of effects, and ``name`` one of its
-    parameters. ``scale`` is the natural size of a change, ``prior`` a mean and a standard deviation,
-    all in the unit of the parameter. ``frozen`` keeps it at ``initial``. ``nuisance`` marks a
-    parameter whose sensitivity is computed once and refreshed at the end.
-    """
-
-    name: str
-    initial: float
-    lower: float
-    upper: float
-    scale: float
-    effect: int | None = None
-    prior: tuple[float, float] | None = None
-    frozen: bool = False
-    nuisance: bool = False
-
-
-@summarized
-@dataclass(frozen=True)
-class Weighting:
-    """Weight of residuals over frequency, one table per axis, and decimation.
-
-    ``frequency_hz`` (n_freq,) [Hz] and ``weight`` (n_axes, n_freq) are linear in between and constant
-    outside. Frequencies above the Nyquist frequency after decimation have weight zero. A residual of
-    standard deviation s weighted by 1/s counts one.
-    """
-
-    frequency_hz: Array
-    weight: Array
-    decimation: int = 1
-
-    @classmethod
-    def flat(cls, n_axes: int) -> Weighting:
-        """Return a weighting of one at all frequencies."""
-        return cls(np.zeros(1), np.ones((n_axes, 1)))
-
-    def of(self, series: Array, sample_time_s: float) -> Array:
-        """Return signals (n, n_axes) weighted and decimated, (n // decimation, n_axes).
-
-        Like the core, it continues the signals by reflection and filters with zero phase.
-        """
-        kept = len(series) // self.decimation
-        whole = series[: kept * self.decimation]
-        spectrum = np.fft.rfft(np.concatenate([whole, whole[::-1]]), axis=0)[: kept + 1]
-        frequency = np.arange(kept + 1) / (2 * len(whole) * sample_time_s)
-        weight = [np.interp(frequency, self.frequency_hz, w) for w in self.weight]
-        spectrum *= np.stack(weight, axis=1) / np.sqrt(self.decimation)
-        if self.decimation > 1:
-            # Decimation folds two frequencies onto the new Nyquist frequency.
-            spectrum[-1] = 0.0
-        return np.asarray(np.fft.irfft(spectrum, 2 * kept, axis=0)[:kept])
-
-    def core(self) -> list[tuple[list[float], list[float], int]]:
-        """Return the tables in the form of the compiled core."""
-        f = self.frequency_hz.tolist()
-        return [(f, w.tolist(), self.decimation) for w in self.weight]
 
 
 @dataclass(frozen=True)
@@ -165,112 +103,6 @@ class Fitted:
         )
 
 
-@dataclass(frozen=True)
-class Spec:
-    """A parameter in the form of the compiled core."""
-
-    robot: str | None
-    effect: tuple[int, int] | None
-    initial: float
-    lower: float
-    upper: float
-    scale: float
-    prior: tuple[float, float] | None
-    frozen: bool
-    nuisance: bool
-    amplitude: int | None
-
-
-PRIOR_REACH = 4.0
-"""Bounds of a parameter with a tolerance, in standard deviations of its prior."""
-
-
-def robot_parameters(robot: Robot) -> dict[str, float]:
-    """Return the names and values of all physical parameters of a robot."""
-    return robot.parameters()
-
-
-def robot_parameter(
-    robot: Robot, name: str, *, relative_tolerance: float | None = None, nuisance: bool = False
-) -> Parameter:
-    """Return a robot parameter at its nominal value, free or within a tolerance.
-
-    ``relative_tolerance``, relative to the value, becomes the standard deviation of a prior, with
-    bounds at four standard deviations. ``nuisance`` is that of `Parameter`. Raises InputError for an
-    unknown name.
-    """
-    known = robot_parameters(robot)
-    if name not in known:
-        raise InputError(
-            f"parameter {name!r}: expected one of {', '.join(known)}{did_you_mean(name, known)}"
-        )
-    nominal = known[name]
-    size = abs(nominal) if nominal else 1.0
-    signed = name.rsplit(".", 1)[1].startswith("com_")
-    if relative_tolerance is None:
-        lower = -10 * size if signed else 1e-6 * size
-        return Parameter(name, nominal, lower, max(100 * size, lower), size, nuisance=nuisance)
-    spread = relative_tolerance * size
-    reach = PRIOR_REACH * spread
-    lower = nominal - reach if signed else max(nominal - reach, 1e-6 * size)
-    return Parameter(
-        name,
-        nominal,
-        lower,
-        nominal + reach,
-        spread,
-        prior=(nominal, spread),
-        nuisance=nuisance,
-    )
-
-
-def effect_parameter(effects: Sequence[Effect], index: int, name: str) -> Parameter:
-    """Return the parameter ``name`` of ``effects[index]``, at its present value and with its bounds.
-
-    Raises InputError for an unknown name.
-    """
-    info = {p.name: p for p in effect_info(effects[index].name).parameters}
-    if name not in info:
-        raise InputError(
-            f"effect {effects[index].name!r}: parameter {name!r}: expected {', '.join(info)}"
-            f"{did_you_mean(name, info)}"
-        )
-    p = info[name]
-    initial = (effects[index].parameters or {}).get(name, p.neutral)
-    return Parameter(name, initial, p.lower, p.upper, p.typical, effect=index)
-
-
-def core_spec(parameter: Parameter, effects: Sequence[Effect]) -> Spec:
-    """Return a parameter in the form of the compiled core."""
-    place = None
-    if parameter.effect is not None:
-        names = [p.name for p in effect_info(effects[parameter.effect].name).parameters]
-        place = (parameter.effect, names.index(parameter.name))
-    return Spec(
-        robot=parameter.name if parameter.effect is None else None,
-        effect=place,
-        initial=parameter.initial,
-        lower=parameter.lower,
-        upper=parameter.upper,
-        scale=parameter.scale,
-        prior=parameter.prior,
-        frozen=parameter.frozen,
-        nuisance=parameter.nuisance,
-        amplitude=None
-        if parameter.effect is None
-        else _amplitude(effects[parameter.effect], parameter.name),
-    )
-
-
-def _amplitude(effect: Effect, name: str) -> int | None:
-    """Return the position of the effect's only amplitude if ``name`` is a shape, else None."""
-    table = effect_info(effect.name).parameters
-    sizes = [i for i, p in enumerate(table) if p.role == "amplitude"]
-    shape = any(p.name == name and p.role == "shape" for p in table)
-    # Only an amplitude that is neutral at zero is a factor of the effect.
-    return sizes[0] if shape and len(sizes) == 1 and table[sizes[0]].neutral == 0 else None
-
-
 def fit(
     robot: Robot,
     logs: Sequence[Log],
@@ -278,6 +110,7 @@ def fit(
     *,
     effects: Iterable[Effect] = (),
     weighting: Weighting | None = None,
+    joint_weighting: Weighting | None = None,
     options: FitOptions | None = None,
 ) -> Fitted:
     """Fit parameters to several logs together, and return values with standard errors.
@@ -285,29 +118,86 @@ def fit(
     If the robot has a velocity controller and all logs have velocity references, the fit compares
     simulated and logged torque commands [Nm]. Otherwise the logged torque drives the simulation, and
     the fit compares motor positions [rad]. ``weighting`` and ``options`` have defaults.
+
+    With a ``joint_weighting`` (weights in 1/rad), the fit also compares the angles of the driven joints with
+    ``joint_position_rad`` of the logs. The zero of a joint encoder does not matter: its mean error over a log
+    is removed. Axes without an encoder (NaN) and logs without any are not compared.
+
+    A log may state its load (``load``). It replaces the robot's own effect ``payload`` in that log only.
+
     Effect parameters refer to positions in ``effects``. The robot's own effects act too; an effect in
     ``effects`` replaces the robot's own one with the same name and axis.
     Raises InputError for misuse, and for a start that cannot be simulated; non-convergence is a status.
     """
     chosen = options or FitOptions()
     added = robot.placed(effects)
-    closed = is_closed_loop(robot, logs)
-    ready = _core.SimulatedLogs(
-        robot.core,
-        records(logs, closed=closed),
-        (weighting or Weighting.flat(robot.n_axes)).core(),
-        input="reference" if closed else "torque",
-        output="torque" if closed else "position",
-        block_s=chosen.block_s,
-        integrator=chosen.integrator,
+    ready, every = simulated_logs(
+        robot,
+        logs,
+        added,
+        weighting=weighting,
+        joint_weighting=joint_weighting,
+        options=chosen,
     )
-    result = ready.fit(core_effects(added), [core_spec(p, added) for p in parameters], chosen)
+    specs = [core_spec(with_search(p), added) for p in parameters]
+    result = ready.fit(core_effects(every), specs, chosen)
     if isinstance(result, Diverged):
         raise InputError(
             f"parameters: expected initial values that can be simulated, got some where {result}; "
             "start nearer to the machine, or integrate in smaller steps"
         )
     return fitted(result, parameters, added)
+
+
+def simulated_logs(
+    robot: Robot,
+    logs: Sequence[Log],
+    effects: Sequence[Effect],
+    *,
+    weighting: Weighting | None = None,
+    joint_weighting: Weighting | None = None,
+    options: FitOptions,
+) -> tuple[_core.SimulatedLogs, list[Effect]]:
+    """Return the logs ready for fits, and ``effects`` with a payload if logs state their load.
+
+    Arguments are those of `fit`, with ``effects`` placed. Raises InputError as `fit`.
+    """
+    closed = is_closed_loop(robot, logs)
+    every, own = with_loads(robot, effects, [log.load for log in logs])
+    joints = None if joint_weighting is None else joint_angles(logs)
+    ready = _core.SimulatedLogs(
+        robot.core,
+        records(logs, closed=closed),
+        (weighting or Weighting.flat(robot.n_axes)).core(),
+        input="reference" if closed else "torque",
+        output="torque" if closed else "position",
+        joint=joints or [],
+        joint_weighting=[] if joint_weighting is None else joint_weighting.core(),
+        own=own,
+        block_s=options.block_s,
+        integrator=options.integrator,
+    )
+    return ready, every
+
+
+def joint_angles(logs: Sequence[Log]) -> list[Array | None]:
+    """Return the joint encoders of each log (lead + n, n_axes) [rad], None for a log without one.
+
+    Raises InputError if no log has a joint encoder.
+    """
+    if all(log.joint_position_rad is None for log in logs):
+        raise InputError(
+            "joint_weighting: expected logs with joint_position_rad (columns joint_position_N), got none"
+        )
+    out: list[Array | None] = []
+    for log in logs:
+        angles = log.joint_position_rad
+        if angles is not None:
+            # Samples of the run-up are not compared.
+            before = np.zeros((log.lead, log.n_axes))
+            angles = np.ascontiguousarray(np.concatenate([before, angles]))
+        out.append(angles)
+    return out
 
 
 def is_closed_loop(robot: Robot, logs: Sequence[Log]) -> bool:
@@ -384,8 +274,30 @@ def _warnings(result: _core.FitResult, at_bound: Sequence[str]) -> list[str]:
         out.append(STATUS_ADVICE[result.status] + remedy)
     if at_bound:
         out.append(f"on a bound: {', '.join(at_bound)}")
+    dropped = _dropped_blocks(result)
+    if dropped:
+        out.append(
+            f"{100 * dropped:.2g} % of the data blocks took no part in the search, because a natural change of "
+            "a parameter changes them a thousand times more than noise: they are chaotic (contact, stiction), "
+            "or the weights or the scale of a parameter are too large"
+        )
     if result.condition > _POOR_CONDITION:
         out.append(
             f"condition number {result.condition:.1e}: the data hardly separates some parameters"
         )
     return out
+
+
+def _dropped_blocks(result: _core.FitResult) -> float:
+    """Return the share of blocks that the fit counts in the loss but not in the derivatives."""
+    if not result.free or not result.blocks:
+        return 0.0
+    empty = ~np.any(result.block_matrix, axis=(1, 2)) & (result.block_loss > 0)
+    if not empty.any():
+        return 0.0
+    moved = result.jacobian
+    cut = [
+        bool(lost and moved[:, start : start + n].any())
+        for lost, (_, _, start, n) in zip(empty, result.blocks, strict=True)
+    ]
+    return float(np.mean(cut))

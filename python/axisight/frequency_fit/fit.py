@@ -14,6 +14,7 @@ from axisight import _core
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.fitting import Parameter
+from axisight.fitting.loads import with_loads
 from axisight.frequency_fit.measured import MeasuredResponse, measured, model_response
 from axisight.frequency_fit.options import FrequencyFitOptions, core_options
 from axisight.frequency_fit.parameters import Spec, specs
@@ -62,7 +63,8 @@ def fit_responses(
         and within a factor of 100 unless bounds are given.
     effects
         Effects that leave the robot linear: payload, joint_stiffness, joint_damping, motor_inertia.
-        They replace the robot's own effects of the same name and axis; its other effects act too.
+        A response with a ``load`` has its own payload. Effects replace the robot's own effects of the
+        same name and axis; its other effects act too.
     options
         See :class:`FrequencyFitOptions`.
 
@@ -92,6 +94,7 @@ def fit_responses(
         )
     chosen = replace(chosen, block_lines=_block_lines(chosen, wanted, data))
     nothing: list[Complex | None] = [None] * len(data)
+    every, own = with_loads(robot, robot.placed(effects), [one.load for one in data])
     weighing = _weighing(data, chosen, nothing)
 
     def search(
@@ -99,9 +102,12 @@ def fit_responses(
     ) -> _core.FrequencyFitResult:
         return _core.fit_frequency_responses(
             robot.core,
-            core_effects(robot.placed(effects)),
+            core_effects(every),
             list(start),
-            [one.core(g, w) for one, g, w in zip(data, reference, weighing, strict=True)],
+            [
+                one.core(g, w, values)
+                for one, g, w, values in zip(data, reference, weighing, own, strict=True)
+            ],
             core_options(chosen),
         )
 
@@ -139,6 +145,8 @@ def _modelled(
     options: FrequencyFitOptions,
     effects: Sequence[Effect],
 ) -> Complex:
+    if measured.load is not None:
+        effects = [*effects, Effect("payload", None, measured.load.parameters)]
     found: Complex = model_response(
         robot,
         measured.frequency_hz,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -15,17 +15,27 @@ from axisight.arguments import one_of, positive
 from axisight.display.summary import summarized
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
+from axisight.fitting.loads import OwnValues
 from axisight.frf import Flag
 from axisight.frf.confidence import median_freedom
 from axisight.frf.pooled import neighbours_for, pooled_variance
 from axisight.frf.quantity import ORDER, RATES, Quantity, quantity_of
+from axisight.logs.load import Load
 from axisight.robot import Robot
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Sampling = Literal["zero_order_hold", "continuous"]
 PoseTuple = tuple[
-    list[float], Real, Complex, Real | None, Real | None, Complex | None, Complex | None, int
+    list[float],
+    Real,
+    Complex,
+    Real | None,
+    Real | None,
+    Complex | None,
+    Complex | None,
+    int,
+    OwnValues,
 ]
 
 UNITS: dict[str, Quantity] = {f"rad{rate}/Nm": quantity for quantity, rate in RATES.items()}
@@ -55,6 +65,8 @@ class MeasuredResponse:
         Complex degrees of freedom of the variance; ``None`` if the variance is known exactly.
     dropped_lines
         Number of lines left out because the estimator flagged them as NaN.
+    load
+        Load of the arm during the measurement; None if the robot describes it.
 
     Raises InputError for other shapes, values that are not finite, and a variance with a covariance.
     """
@@ -67,6 +79,7 @@ class MeasuredResponse:
     covariance: Complex | None = None
     degrees_of_freedom: float | None = None
     dropped_lines: int = 0
+    load: Load | None = None
 
     def __post_init__(self) -> None:
         """Check shapes and values."""
@@ -142,6 +155,10 @@ class MeasuredResponse:
             int(np.sum(~keep)),
         )
 
+    def with_load(self, load: Load | None) -> MeasuredResponse:
+        """Return the response with the ``load`` that the arm carried."""
+        return replace(self, load=load)
+
     @property
     def elements_weighed_together(self) -> int:
         """Number of elements that one weight matrix couples: 1 for weights from variances."""
@@ -172,11 +189,17 @@ class MeasuredResponse:
         out[order] = pooled_variance(magnitude[order], self.variance[order], freedom, count)
         return out
 
-    def core(self, reference: Complex | None = None, weighing: Real | None = None) -> PoseTuple:
+    def core(
+        self,
+        reference: Complex | None = None,
+        weighing: Real | None = None,
+        own: OwnValues | None = None,
+    ) -> PoseTuple:
         """Return the arrays in the form of the compiled core.
 
         Logarithmic weights are relative to the magnitude of ``reference``. ``weighing``, shaped as
-        ``response``, is the variance for the weights, None for each line's own.
+        ``response``, is the variance for the weights, None for each line's own. ``own`` are values of effect
+        parameters that hold for this response only.
         """
         variance = None if self.variance is None else np.ascontiguousarray(self.variance.ravel())
         covariance = None if self.covariance is None else self.covariance.ravel()
@@ -189,6 +212,7 @@ class MeasuredResponse:
             covariance,
             None if reference is None else np.ascontiguousarray(reference.ravel()),
             ORDER[self.quantity],
+            own or [],
         )
 
 

@@ -22,6 +22,15 @@ from axisight.graybox.landmarks import (
     find_resonance,
     high_frequency_gain,
 )
+from axisight.graybox.multiaxis import (
+    ElasticStep,
+    JointStep,
+    OperatingPoint,
+    RigidStep,
+    RobotIdentification,
+    identified_robot,
+    identify_robot,
+)
 from axisight.graybox.multistart import AxisMultistart, multistart_axis
 from axisight.graybox.prediction_error import fit_axis
 from axisight.graybox.procedure import AxisIdentification, identify_axis
@@ -48,14 +57,19 @@ __all__ = [
     "Collocated",
     "Comparison",
     "CubicSpring",
+    "ElasticStep",
     "FitSettings",
     "Flexibility",
     "HighFrequencyGain",
     "InitialModel",
+    "JointStep",
     "Landmark",
     "NoiseModel",
+    "OperatingPoint",
     "ResidualTests",
     "RigidBodyFriction",
+    "RigidStep",
+    "RobotIdentification",
     "SpringMassChain",
     "axis_data",
     "collocated",
@@ -70,7 +84,9 @@ __all__ = [
     "fit_table",
     "high_frequency_gain",
     "identified_axis",
+    "identified_robot",
     "identify_axis",
+    "identify_robot",
     "initial_flexibility",
     "initial_model",
     "multistart_axis",

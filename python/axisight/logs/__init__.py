@@ -14,6 +14,7 @@ from axisight.logs.columns import (
 )
 from axisight.logs.filters import decimate_zero_phase, differentiate, lowpass
 from axisight.logs.findings import Finding
+from axisight.logs.load import Load
 from axisight.logs.log import AxisKind, Log
 from axisight.logs.map_files import AnyMap, load_column_map, named_map_text, parse_column_map
 from axisight.logs.maps import MAPS
@@ -35,6 +36,7 @@ __all__ = [
     "ColumnPattern",
     "CsvOptions",
     "Finding",
+    "Load",
     "Log",
     "LogReport",
     "PositionColumn",

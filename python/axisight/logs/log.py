@@ -15,6 +15,7 @@ from axisight.arguments import not_negative, positive
 from axisight.display import html
 from axisight.display.summary import summarized
 from axisight.errors import InputError
+from axisight.logs.load import Load
 from axisight.logs.run_up import RunUp
 
 if TYPE_CHECKING:
@@ -62,6 +63,8 @@ class Log:
     rest; None means the robot's operating point. `run_up` is the simulated motion before a run that begins in
     motion; None if the run begins at rest.
 
+    `load` is what the arm carried during this run; None if the robot describes it.
+
     `nominal_nm_a` (axes,) concerns axes whose torque was logged as a current with an unknown torque constant.
     For such an axis it is the constant (Nm/A) by which `torque_nm` was computed, or NaN if `torque_nm` is
     still the current (A). For other axes it is None; it may be empty if no axis is of this kind.
@@ -90,6 +93,7 @@ class Log:
     notes: tuple[str, ...] = ()
     nominal_nm_a: tuple[float | None, ...] = ()
     recorded: RecordedRows | None = None
+    load: Load | None = None
 
     def __post_init__(self) -> None:
         """Check the shapes and fill in revolute axes."""

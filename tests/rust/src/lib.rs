@@ -118,6 +118,7 @@ pub fn free(target: Target, initial: f64, scale: f64) -> FitParameter {
         frozen: false,
         amplitude: None,
         nuisance: false,
+        logarithmic: false,
     }
 }
 

@@ -82,6 +82,7 @@ fn problem(input: SimulationInput) -> SimulationErrorProblem {
         input,
         output: SimulationOutput::Torque,
         weighting: vec![flat(1.0); 3],
+        joint_weighting: Vec::new(),
         method: METHOD,
         block_s: 0.05,
         courses: None,
@@ -302,6 +303,7 @@ fn courses_that_do_not_serve_are_left_alone() {
             .map(|n| Arc::new(Record::new(vec![0.0; n], vec![0.0; n])))
             .collect(),
         weighting: vec![flat(1.0)],
+        joint_weighting: Vec::new(),
         parameters: Vec::new(),
         effects: Vec::new(),
         robot: arm,

@@ -25,7 +25,7 @@ const RULES: [Rules; 2] = [
         step_tolerance: 1e-10,
         rounding: 1e-28,
         settled: 1e-6,
-        damping: Damping::Kept,
+        damping: Damping::KEPT,
     },
     Rules {
         max_iterations: 100,
@@ -538,4 +538,47 @@ fn damping_is_not_taken_for_a_minimum() {
     assert!(outcome.status.converged(), "{:?}", outcome.status);
     // A step has to be worth 1e-5 of a loss of 901: a tenth of the difference.
     assert!((theta[0] - theta[1] - 1.0).abs() < 0.1, "{theta:?}");
+}
+
+/// A resonance `w = sqrt(k / m)` [rad/s] is known, and `m` a hundred times worse. In logarithms the
+/// problem is linear, so that the search ends at the minimum from any positive start. Starts that are
+/// wrong by the factor `f` need at least `log2 f` steps, as no step changes a parameter by more than
+/// two.
+#[test]
+fn logarithms_end_at_the_minimum_from_afar_and_never_step_further_than_a_factor_of_two() {
+    #[allow(clippy::unnecessary_wraps)]
+    fn resonance(t: &[f64]) -> Rows {
+        let [k, m] = [t[0], t[1]];
+        let residual = vec![100.0 * (k / m / 4.0).ln(), (m / 0.5).ln()];
+        Some((
+            residual,
+            vec![vec![100.0 / k, -100.0 / m], vec![0.0, 1.0 / m]],
+        ))
+    }
+    let limits = Limits {
+        lower: vec![1e-9; 2],
+        logarithmic: vec![true; 2],
+        ..wide(2)
+    };
+    for damping in [CONSTANT, Damping::Kept { start: 1.0 }] {
+        for start in [[200.0, 0.5], [0.02, 30.0], [1e-3, 1e-3]] {
+            let rules = Rules {
+                damping,
+                ..RULES[1]
+            };
+            let mut model = Model::new(resonance, &start);
+            let (outcome, theta) = run(&mut model, &limits, &rules, &start);
+            assert!(outcome.status.converged(), "{:?}", outcome.status);
+            assert!(
+                (theta[0] - 2.0).abs() < 1e-5 && (theta[1] - 0.5).abs() < 1e-6,
+                "{theta:?}"
+            );
+            let far = (start[0] / 2.0_f64).log2().abs();
+            assert!(
+                outcome.iterations as f64 >= far,
+                "{} {far}",
+                outcome.iterations
+            );
+        }
+    }
 }

@@ -108,7 +108,7 @@ pub fn search(
         step_tolerance: options.step_tolerance,
         rounding: ROUNDING * problem.energy(),
         settled: SETTLED / count.max(1) as f64,
-        damping: Damping::Kept,
+        damping: Damping::KEPT,
     };
     let mut search = Search {
         problem,
@@ -132,6 +132,7 @@ fn limits(parameters: &[SearchParameter], free: &[usize]) -> Limits {
         upper: each(|p| p.upper),
         scale: each(|p| p.scale),
         reach: Reach::Factor(LARGEST_FACTOR),
+        logarithmic: vec![false; free.len()],
     }
 }
 

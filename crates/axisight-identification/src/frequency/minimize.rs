@@ -153,6 +153,8 @@ impl<'a> Search<'a> {
             upper: free().map(|p| searched(p.logarithmic, p.upper)).collect(),
             scale: vec![1.0; self.problem.free.len()],
             reach: Reach::Scales(LONGEST_STEP),
+            // The problem takes logarithms itself.
+            logarithmic: vec![false; self.problem.free.len()],
         }
     }
 
@@ -164,7 +166,7 @@ impl<'a> Search<'a> {
             step_tolerance: options.step_tolerance,
             rounding: 0.0,
             settled: SETTLED / self.problem.count().max(1) as f64,
-            damping: Damping::Kept,
+            damping: Damping::KEPT,
         };
         let (limits, start) = (self.limits(), self.free());
         let mut descent = Bounded::new(self, &limits, start);

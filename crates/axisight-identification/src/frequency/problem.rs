@@ -174,7 +174,7 @@ impl FrequencyProblem {
         let values = self.values(theta);
         let parameters = self.parameters.iter().map(|p| p.parameter);
         let overrides: Vec<_> = parameters.zip(values.iter().copied()).collect();
-        let linearizer = Linearizer::new(&self.robot, &self.settings, &overrides, &self.free)
+        let usual = Linearizer::new(&self.robot, &self.settings, &overrides, &self.free)
             .map_err(|source| FrequencyFitError::Robot { pose: 1, source })?;
         let slope = |i: &usize| {
             if self.parameters[*i].logarithmic {
@@ -185,10 +185,35 @@ impl FrequencyProblem {
         };
         let slopes: Vec<f64> = self.free.iter().map(slope).collect();
         let one = |(number, pose): (usize, &Prepared)| {
-            let residuals = self.residuals(number, pose, &linearizer, &slopes)?;
+            let own = self.own_settings(pose).map(|settings| {
+                Linearizer::new(&self.robot, &settings, &overrides, &self.free).map_err(|source| {
+                    FrequencyFitError::Robot {
+                        pose: number + 1,
+                        source,
+                    }
+                })
+            });
+            let own = own.transpose()?;
+            let linearizer = own.as_ref().unwrap_or(&usual);
+            let residuals = self.residuals(number, pose, linearizer, &slopes)?;
             Ok(take(pose, residuals))
         };
         self.poses.par_iter().enumerate().map(one).collect()
+    }
+
+    /// Effects at a pose that has values of its own; `None` for other poses.
+    fn own_settings(&self, pose: &Prepared) -> Option<Vec<EffectSetting<f64>>> {
+        if pose.data.own.is_empty() {
+            return None;
+        }
+        let mut settings = self.settings.clone();
+        for one in &pose.data.own {
+            let setting = settings.get_mut(one.effect);
+            if let Some(number) = setting.and_then(|s| s.parameters.get_mut(one.parameter)) {
+                *number = one.value;
+            }
+        }
+        Some(settings)
     }
 
     fn residuals(

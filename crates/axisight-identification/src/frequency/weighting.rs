@@ -1,6 +1,7 @@
 //! Criteria (3.42) to (3.44): the compared quantity, and the weight of a deviation.
 
 use super::error::FrequencyFitError;
+use crate::logs::OwnValue;
 use nalgebra::{Complex, DMatrix};
 
 type C = Complex<f64>;
@@ -51,6 +52,8 @@ pub struct PoseResponse {
     pub reference: Option<Vec<C>>,
     /// Derivative of the motor angle that is the output: 0, 1 or 2.
     pub order: u8,
+    /// Effect parameters whose values hold at this operating point only, such as its load.
+    pub own: Vec<OwnValue>,
 }
 
 /// Factors that turn deviations of a line into residuals of unit variance.

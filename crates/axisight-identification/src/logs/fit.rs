@@ -46,8 +46,8 @@ impl Default for FitOptions {
 }
 
 impl FitOptions {
-    /// Rules of a search with `left` iterations, which gives up after `failures` in a row.
-    fn rules(&self, left: usize, failures: usize) -> Rules {
+    /// Rules of a search with `left` iterations.
+    fn rules(&self, left: usize, damping: Damping) -> Rules {
         Rules {
             max_iterations: left,
             loss_tolerance: self.loss_tolerance,
@@ -55,16 +55,16 @@ impl FitOptions {
             step_tolerance: self.step_tolerance,
             rounding: 0.0,
             settled: WORTH_A_STEP,
-            damping: Damping::Constant {
-                start: 1e-3,
-                shrink: 0.2,
-                grow: 8.0,
-                least: 1e-12,
-                failures,
-            },
+            damping,
         }
     }
 }
+
+/// Damping of the first step if logarithms are searched. They are searched where the start may be
+/// far off, so the first steps are short.
+const FAR: f64 = 1.0;
+/// Damping of the first step otherwise.
+const NEAR: f64 = 1e-3;
 
 /// Result of a fit.
 #[derive(Debug, Clone)]
@@ -258,6 +258,24 @@ impl<'a, P: Problem> Search<'a, P> {
         search
     }
 
+    /// The damping of a search that gives up after `failures` in a row.
+    ///
+    /// Predictions are reliable only if all columns belong to the present point.
+    fn damping(&self, failures: usize) -> Damping {
+        let far = self.free.iter().any(|i| self.parameters[*i].logarithmic);
+        let start = if far { FAR } else { NEAR };
+        if far && self.fresh.len() == self.free.len() {
+            return Damping::Kept { start };
+        }
+        Damping::Constant {
+            start,
+            shrink: 0.2,
+            grow: 8.0,
+            least: 1e-12,
+            failures,
+        }
+    }
+
     /// Take steps from the present point, after `iterations` earlier steps. Returns the status and
     /// the new number of steps.
     fn descend(
@@ -268,7 +286,7 @@ impl<'a, P: Problem> Search<'a, P> {
     ) -> Result<(Status, usize), ProblemError> {
         let limits = limits(self.parameters, &self.free);
         let left = options.max_iterations - iterations;
-        let rules = options.rules(left.min(patience.steps), patience.failures);
+        let rules = options.rules(left.min(patience.steps), self.damping(patience.failures));
         let theta = self.free.iter().map(|i| self.theta[*i]).collect();
         let outcome = search(&mut Bounded::new(self, &limits, theta), &rules)?;
         Ok((outcome.status, iterations + outcome.iterations))

@@ -11,7 +11,7 @@ use axisight_numerics::Weighting;
 pub struct Block {
     /// Index of the log.
     pub record: usize,
-    /// Index of the axis.
+    /// Index of the axis. Joint encoders, if compared, count as further axes.
     pub axis: usize,
     /// First entry in the residual vector.
     pub start: usize,
@@ -33,12 +33,13 @@ pub struct BlockGram {
 }
 
 /// Blocks of about `block_s` seconds for logs of `lengths` samples, ordered by log, axis and time.
-pub(super) fn blocks(
+pub(super) fn blocks<'a>(
     lengths: impl Iterator<Item = usize>,
-    weighting: &[Weighting],
+    weighting: impl Iterator<Item = &'a Weighting>,
     sample_time: f64,
     block_s: f64,
 ) -> Vec<Block> {
+    let weighting: Vec<&Weighting> = weighting.collect();
     let mut start = 0;
     let mut out = Vec::new();
     for (record, n_samples) in lengths.enumerate() {

@@ -483,7 +483,7 @@ impl Problem for InverseDynamics {
         let lengths = self.records.iter().map(|r| r.torque.len() / n_axes);
         blocks(
             lengths,
-            &self.weighting,
+            self.weighting.iter(),
             self.robot.sample_time,
             self.block_s,
         )

@@ -101,6 +101,13 @@ fn check(parameters: &[FitParameter]) -> Result<(), ProblemError> {
                 got: format!("{p:?}"),
             });
         }
+        if p.logarithmic && p.lower <= 0.0 {
+            return Err(ProblemError::Invalid {
+                field: format!("parameters[{i}].lower"),
+                expected: "above zero, as the logarithm is searched".into(),
+                got: p.lower.to_string(),
+            });
+        }
     }
     Ok(())
 }
@@ -113,6 +120,7 @@ pub(super) fn limits(parameters: &[FitParameter], free: &[usize]) -> Limits {
         upper: each(|p| p.upper),
         scale: each(|p| p.scale),
         reach: Reach::Bounds,
+        logarithmic: free.iter().map(|i| parameters[*i].logarithmic).collect(),
     }
 }
 
@@ -134,7 +142,10 @@ pub(super) fn grams<P: Problem>(
 ) -> (f64, Vec<BlockGram>) {
     let (losses, weight): (Vec<f64>, Vec<f64>) = residual.iter().map(|r| loss.evaluate(*r)).unzip();
     let columns: Vec<&[f64]> = columns.iter().map(|c| &c[..]).collect();
-    let scale: Vec<f64> = free.iter().map(|i| parameters[*i].scale).collect();
+    let scale: Vec<f64> = free
+        .iter()
+        .map(|i| parameters[*i].natural_change())
+        .collect();
     let blocks = problem.blocks().into_par_iter();
     let blocks = blocks.map(|block| {
         let range = block.start..block.start + block.len;

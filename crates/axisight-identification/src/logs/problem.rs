@@ -39,6 +39,25 @@ pub struct FitParameter {
     /// Whether its sensitivity changes little. Its column is then computed once, or taken from an
     /// earlier fit, and renewed only on request.
     pub nuisance: bool,
+    /// Whether its logarithm is searched. Its lower bound is then above zero.
+    pub logarithmic: bool,
+}
+
+/// Natural change of a parameter whose logarithm is searched, as a share of its value.
+///
+/// Doubling a stiffness changes the torques of a precise log by thousands of standard deviations of
+/// its noise. No chaos is needed for that.
+const SMALL_SHARE: f64 = 0.01;
+
+impl FitParameter {
+    /// The change by which the sensitivity of residuals is judged.
+    pub(super) fn natural_change(&self) -> f64 {
+        if self.logarithmic {
+            SMALL_SHARE * self.initial
+        } else {
+            self.scale
+        }
+    }
 }
 
 /// Residuals with some columns of their Jacobian.

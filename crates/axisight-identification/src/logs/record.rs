@@ -2,6 +2,17 @@
 
 use super::problem::{ProblemError, invalid};
 
+/// The value of an effect parameter in one log.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OwnValue {
+    /// Index of the effect.
+    pub effect: usize,
+    /// Index of the parameter in the table of the effect.
+    pub parameter: usize,
+    /// The value.
+    pub value: f64,
+}
+
 /// One log to be reproduced. Arrays are row-major `(n_samples, n_axes)`.
 #[derive(Debug, Clone)]
 pub struct Record {
@@ -13,6 +24,10 @@ pub struct Record {
     /// Factor on the weighted error of each sample, from 0 to 1: how well a model can follow the
     /// log there. `None` means one everywhere.
     pub certainty: Option<Vec<f64>>,
+    /// Measured angles of the driven joints [rad], NaN on an axis without such a sensor.
+    pub joint: Option<Vec<f64>>,
+    /// Effect parameters whose values hold in this log only, such as its load.
+    pub own: Vec<OwnValue>,
     /// Driven joint angles at the start of the run, at rest [rad]. `None` means the operating
     /// point.
     pub start: Option<Vec<f64>>,
@@ -28,6 +43,8 @@ impl Record {
             input,
             target,
             certainty: None,
+            joint: None,
+            own: Vec::new(),
             start: None,
             lead: 0,
         }
@@ -41,6 +58,8 @@ impl Record {
             input: self.input[..kept.min(self.input.len())].to_vec(),
             target: self.target[..kept.min(self.target.len())].to_vec(),
             certainty: certainty.map(|c| c[..(n_samples * n_axes).min(c.len())].to_vec()),
+            joint: self.joint.as_ref().map(|j| j[..kept.min(j.len())].to_vec()),
+            own: self.own.clone(),
             start: self.start.clone(),
             lead: self.lead,
         }
@@ -53,6 +72,16 @@ impl Record {
         if n != m || n == 0 || n % n_axes != 0 {
             let expected = format!("input and target of equal size, {n_axes} axes");
             return Err(invalid(field, expected, format!("{n} and {m} numbers")));
+        }
+        if let Some(joint) = &self.joint
+            && joint.len() != n
+        {
+            let got = joint.len().to_string();
+            return Err(invalid(
+                format!("{field}.joint"),
+                format!("{n} numbers, as the input"),
+                got,
+            ));
         }
         if self.lead >= n / n_axes {
             let expected = format!("less than {} samples", n / n_axes);

@@ -1,5 +1,7 @@
 //! Simulation error: logs compared with a free simulation of the closed loop.
 //!
+//! The angles of the driven joints may be compared as well ([`super::outputs`]).
+//!
 //! All logs run in lock-step in the lanes of one simulation. Derivatives are dual numbers, with a
 //! few parameters per pass ([`super::packing`]).
 //!
@@ -64,6 +66,9 @@ pub struct SimulationErrorProblem {
     pub output: SimulationOutput,
     /// One weighting per axis.
     pub weighting: Vec<Weighting>,
+    /// One weighting per axis for the angles of the driven joints, which are then compared too.
+    /// Empty if they are not compared.
+    pub joint_weighting: Vec<Weighting>,
     /// Integrator.
     pub method: Method,
     /// Length of a block [s].
@@ -80,8 +85,8 @@ pub(super) type SharedCourse = Arc<Course<Lanes<LANES>>>;
 /// A function that receives every state of a run.
 type Keep<'a, S> = &'a mut dyn FnMut(&[S]);
 
-/// Series for each lane and axis, value first, then derivatives:
-/// `[quantity][lane * axes + axis][sample]`.
+/// Series for each lane and output, value first, then derivatives:
+/// `[quantity][lane * outputs + output][sample]`. The outputs are those of [`super::outputs`].
 pub(super) type Traces = Vec<Vec<Vec<f64>>>;
 
 /// The arm of a run.
@@ -103,6 +108,9 @@ impl SimulationErrorProblem {
     pub fn validate(&self) -> Result<(), ProblemError> {
         let n_axes = self.robot.n_axes();
         check_logs(self.records.len(), &self.weighting, n_axes)?;
+        if !self.joint_weighting.is_empty() {
+            check_logs(self.records.len(), &self.joint_weighting, n_axes)?;
+        }
         for (i, record) in self.records.iter().enumerate() {
             record.validate(i, n_axes)?;
         }
@@ -144,7 +152,7 @@ impl SimulationErrorProblem {
     }
 
     /// Number of compared samples of a log.
-    fn n_samples(&self, record: usize) -> usize {
+    pub(super) fn n_samples(&self, record: usize) -> usize {
         let record = &self.records[record];
         record.input.len() / self.robot.n_axes() - record.lead
     }
@@ -155,19 +163,22 @@ impl SimulationErrorProblem {
         all.chunks(LANES).map(<[usize]>::to_vec).collect()
     }
 
+    /// The plant of the logs `records`, each with its own values of effects in its lanes.
     fn plant<S: Scalar>(
         &self,
+        records: &[usize],
         theta: &[f64],
         seeds: &[usize],
         seed: impl Fn(S, usize) -> S,
     ) -> Result<Plant<S>, ProblemError> {
-        let (overrides, settings) = seeded(&self.parameters, &self.effects, theta, seeds, seed);
+        let (overrides, mut settings) = seeded(&self.parameters, &self.effects, theta, seeds, seed);
+        self.set_own_values(records, &mut settings);
         Ok(assemble(&self.robot, &overrides, &settings)?)
     }
 
-    /// The plant without derivatives.
+    /// The plant without derivatives and without a log's own values.
     fn bare<S: Scalar>(&self, theta: &[f64]) -> Result<Plant<S>, ProblemError> {
-        self.plant(theta, &[], |number, _| number)
+        self.plant(&[], theta, &[], |number, _| number)
     }
 
     /// The method, with shorter steps if friction turns sharply.
@@ -183,7 +194,7 @@ impl SimulationErrorProblem {
 
     /// The run of the model over the logs `records`.
     pub(super) fn own_run(&self, records: &[usize], theta: &[f64]) -> Result<OwnRun, ProblemError> {
-        let plant = self.bare::<Lanes<LANES>>(theta)?;
+        let plant = self.plant::<Lanes<LANES>>(records, theta, &[], |number, _| number)?;
         let joints = plant.joint_slots();
         let rates = plant.n_angles() + joints.start..plant.n_angles() + joints.end;
         let mut states = Vec::new();
@@ -216,7 +227,7 @@ impl SimulationErrorProblem {
         method: Method,
         mut keep: Option<Keep<'_, S>>,
     ) -> Result<Traces, ProblemError> {
-        let n_axes = plant.axes.len();
+        let n_outputs = self.n_outputs();
         let packing = Packing::of(records.len());
         let in_lanes = packing.fill(records);
         let inputs: Vec<&[f64]> = in_lanes
@@ -235,7 +246,7 @@ impl SimulationErrorProblem {
             .map(|r| self.n_samples(*r))
             .max()
             .unwrap_or(0);
-        let series = || vec![Vec::with_capacity(n_samples); records.len() * n_axes];
+        let series = || vec![Vec::with_capacity(n_samples); records.len() * n_outputs];
         let mut traces: Traces = (0..=n_seeds).map(|_| series()).collect();
         let run = Run {
             controller: &self.robot.controller,
@@ -263,15 +274,18 @@ impl SimulationErrorProblem {
                 SimulationOutput::Torque => sample.command,
                 SimulationOutput::Position => sample.measured,
             };
-            for (axis, y) in output.iter().enumerate() {
+            let joint = |axis| plant.joint_angle(axis, sample.state);
+            let compared = plant.axes.iter().take(self.joint_weighting.len());
+            let joints = compared.map(joint);
+            for (number, y) in output.iter().copied().chain(joints).enumerate() {
                 for (lane, record) in records.iter().enumerate() {
                     if sample.index < self.records[*record].lead {
                         continue;
                     }
-                    let slot = lane * n_axes + axis;
+                    let slot = lane * n_outputs + number;
                     traces[0][slot].push(y.lane(lane));
                     for seed in 0..n_seeds {
-                        traces[seed + 1][slot].push(packing.slope(y, seed, lane));
+                        traces[seed + 1][slot].push(packing.slope(&y, seed, lane));
                     }
                 }
             }
@@ -310,7 +324,8 @@ impl SimulationErrorProblem {
         arm: &Arm<'_>,
     ) -> Result<Traces, ProblemError> {
         let packing = Packing::of(records.len());
-        let plant = self.plant::<S>(theta, seeds, |number, seed| packing.seeded(number, seed))?;
+        let seed = |number, seed| packing.seeded(number, seed);
+        let plant = self.plant::<S>(records, theta, seeds, seed)?;
         let mut stepper = match arm {
             Arm::Exact => Stepper::new(&plant),
             Arm::Along(course) => Stepper::along(&plant, course)?,
@@ -323,47 +338,6 @@ impl SimulationErrorProblem {
             self.steps_at(theta)?,
             None,
         )
-    }
-
-    /// Whitened series of one batch: `[quantity][lane][axis]`, residual first.
-    fn whiten(&self, records: &[usize], mut traces: Traces) -> Vec<Vec<Vec<f64>>> {
-        let n_axes = self.robot.n_axes();
-        for (lane, record) in records.iter().enumerate() {
-            let record = &self.records[*record];
-            let target = &record.target[record.lead * n_axes..];
-            for axis in 0..n_axes {
-                let model = &mut traces[0][lane * n_axes + axis];
-                for (k, y) in model.iter_mut().enumerate() {
-                    *y -= target.get(k * n_axes + axis).copied().unwrap_or(0.0);
-                }
-            }
-        }
-        let mut out = vec![vec![Vec::new(); records.len() * n_axes]; traces.len()];
-        for (lane, record) in records.iter().enumerate() {
-            for (axis, weighting) in self.weighting.iter().enumerate() {
-                let slot = lane * n_axes + axis;
-                let plan = weighting.plan(self.n_samples(*record), self.robot.sample_time);
-                for pair in (0..traces.len()).step_by(2) {
-                    let second = (pair + 1).min(traces.len() - 1);
-                    let (a, b) = plan.apply_pair(&traces[pair][slot], &traces[second][slot]);
-                    out[pair][slot] = a;
-                    out[second][slot] = if second == pair {
-                        out[pair][slot].clone()
-                    } else {
-                        b
-                    };
-                }
-                if let Some(certainty) = &self.records[*record].certainty {
-                    let step = weighting.decimation * n_axes;
-                    let factors = certainty[axis..].iter().step_by(step);
-                    for quantity in &mut out {
-                        let values = quantity[slot].iter_mut().zip(factors.clone());
-                        values.for_each(|(x, factor)| *x *= factor);
-                    }
-                }
-            }
-        }
-        out
     }
 }
 
@@ -504,7 +478,7 @@ impl Problem for SimulationErrorProblem {
         let lengths = (0..self.records.len()).map(|record| self.n_samples(record));
         blocks(
             lengths,
-            &self.weighting,
+            self.weightings(),
             self.robot.sample_time,
             self.block_s,
         )

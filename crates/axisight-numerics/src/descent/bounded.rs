@@ -45,6 +45,10 @@ pub struct Limits {
     pub scale: Vec<f64>,
     /// Limit of one step.
     pub reach: Reach,
+    /// Whether the logarithm of a parameter is searched: the linear model then holds in the
+    /// logarithm, and a step changes the parameter by at most [`Limits::LARGEST_FACTOR`]. Such a
+    /// parameter is positive.
+    pub logarithmic: Vec<bool>,
 }
 
 /// Limit of one step, because the linear model fails far from the minimum.
@@ -67,8 +71,18 @@ const ON_BOUND: f64 = 1e-9;
 const SLIGHT: f64 = 1e-6;
 
 impl Limits {
+    /// Largest factor by which one step changes a parameter whose logarithm is searched.
+    ///
+    /// Resonances move with the root of a stiffness. Beyond a factor of two, a resonance passes the
+    /// measured one by half an octave, and the linear model says nothing about what follows.
+    pub const LARGEST_FACTOR: f64 = 2.0;
+
     /// End of a step of parameter `i`, before bounds are applied.
     fn reached(&self, i: usize, from: f64, step: f64) -> f64 {
+        if self.logarithmic[i] {
+            let most = Self::LARGEST_FACTOR.ln();
+            return from * (step / from).clamp(-most, most).exp();
+        }
         let to = from + step;
         match self.reach {
             Reach::Factor(f) if self.lower[i] >= 0.0 && from > NEAR_ZERO * self.scale[i] => {
@@ -92,8 +106,20 @@ impl Limits {
         }
     }
 
+    /// Move of parameter `i` as the linear model counts it.
+    fn counted(&self, i: usize, from: f64, to: f64) -> f64 {
+        if self.logarithmic[i] {
+            from * (to / from).ln()
+        } else {
+            to - from
+        }
+    }
+
     /// Move of parameter `i` relative to its size.
     fn share(&self, i: usize, from: f64, to: f64) -> f64 {
+        if self.logarithmic[i] {
+            return (to / from).ln().abs();
+        }
         let size = match self.reach {
             Reach::Factor(_) => from.abs().max(NEAR_ZERO * self.scale[i]),
             Reach::Bounds | Reach::Scales(_) => self.scale[i],
@@ -163,7 +189,7 @@ impl<'a, P: LeastSquares> Bounded<'a, P> {
             let (lower, upper) = (limits.lower[i], limits.upper[i]);
             let wanted = limits.reached(i, *from, shortening * step[i]);
             self.next[i] = wanted.clamp(lower, upper);
-            self.change[i] = self.next[i] - from;
+            self.change[i] = limits.counted(i, *from, self.next[i]);
             let beyond = wanted < lower || wanted > upper;
             if beyond && self.held[i].is_none() {
                 self.held[i] = Some(self.change[i]);

@@ -55,7 +55,10 @@ pub trait Descent {
 pub enum Damping {
     /// The damping follows the ratio of actual to predicted reduction: Nielsen (1999), *Damping
     /// parameter in Marquardt's method*. The derivatives must belong to the present point.
-    Kept,
+    Kept {
+        /// Damping of the first step.
+        start: f64,
+    },
     /// The damping changes by constant factors. Use this rule if predictions are unreliable,
     /// because derivatives are reused from another point or partly left out.
     Constant {
@@ -70,6 +73,11 @@ pub enum Damping {
         /// Failures in a row after which the search gives up.
         failures: usize,
     },
+}
+
+impl Damping {
+    /// The rule of Nielsen, for a start near the minimum.
+    pub const KEPT: Self = Self::Kept { start: 1e-3 };
 }
 
 /// The test by which a search decides that the loss no longer falls.
@@ -320,8 +328,6 @@ struct Damper {
 }
 
 impl Damper {
-    /// Damping of the first step, if the rule does not set it.
-    const START: f64 = 1e-3;
     /// A smaller damping is lost in rounding.
     const LEAST: f64 = 1e-15;
     /// Growth of the damping after the first failure. Every further failure doubles the growth.
@@ -331,8 +337,7 @@ impl Damper {
 
     fn new(rule: Damping) -> Self {
         let value = match rule {
-            Damping::Kept => Self::START,
-            Damping::Constant { start, .. } => start,
+            Damping::Kept { start } | Damping::Constant { start, .. } => start,
         };
         Self {
             rule,
@@ -343,7 +348,7 @@ impl Damper {
 
     fn failures(&self) -> usize {
         match self.rule {
-            Damping::Kept => Self::FAILURES,
+            Damping::Kept { .. } => Self::FAILURES,
             Damping::Constant { failures, .. } => failures,
         }
     }
@@ -352,7 +357,7 @@ impl Damper {
     fn succeeded(&mut self, kept: f64) {
         self.growth = Self::GROWTH;
         self.value = match self.rule {
-            Damping::Kept => {
+            Damping::Kept { .. } => {
                 let cube = (2.0 * kept - 1.0).powi(3);
                 (self.value * (1.0 - cube).clamp(0.1, 2.0)).max(Self::LEAST)
             }
@@ -373,7 +378,7 @@ impl Damper {
 
     fn failed(&mut self) {
         match self.rule {
-            Damping::Kept => {
+            Damping::Kept { .. } => {
                 self.value *= self.growth;
                 self.growth *= 2.0;
             }

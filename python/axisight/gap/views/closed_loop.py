@@ -14,7 +14,7 @@ from axisight import _core
 from axisight.effects import Effect, core_effects
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.divergence import Diverged
-from axisight.fitting.simulation_error import core_spec
+from axisight.fitting.parameters import core_spec
 from axisight.gap.controller.feedback import loop_responses, periodic_response
 from axisight.gap.controller.loop_decay import FORGOTTEN, slowest_decay_1_s
 from axisight.gap.controller.other_controllers import check_gains, other_controllers

@@ -15,7 +15,7 @@ from axisight.effects import Effect, core_effects, effect_info
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter, Weighting
 from axisight.fitting.divergence import Diverged
-from axisight.fitting.simulation_error import Spec, core_spec
+from axisight.fitting.parameters import Spec, core_spec
 from axisight.gap.controller.speed_loop import other_controllers_of_targets
 from axisight.gap.facts.settings import Settings
 from axisight.gap.facts.simulator_variant import AS_GIVEN, Variant

@@ -23,7 +23,7 @@ from axisight import (
 from axisight.effects import core_effects
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, robot_parameter
-from axisight.fitting.simulation_error import core_spec
+from axisight.fitting.parameters import core_spec
 from axisight.gap.prepare.reconstructed_references import reference_of
 from axisight.gap.simulator.start_poses import SAYS, at_their_poses, start_of, starts_of
 from gap_data import log_of

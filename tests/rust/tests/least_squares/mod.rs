@@ -73,6 +73,7 @@ pub fn wide(n: usize) -> Limits {
         upper: vec![f64::INFINITY; n],
         scale: vec![1.0; n],
         reach: Reach::Bounds,
+        logarithmic: vec![false; n],
     }
 }
 

@@ -1,0 +1,51 @@
+"""Residuals of a model along logs, without a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.effects import Effect, core_effects
+from axisight.errors import InputError
+from axisight.fitting.divergence import Diverged
+from axisight.fitting.simulation_error import FitOptions, simulated_logs
+from axisight.fitting.weighting import Weighting
+from axisight.logs import Log
+from axisight.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+def simulation_residuals(
+    robot: Robot,
+    logs: Sequence[Log],
+    *,
+    effects: Iterable[Effect] = (),
+    joints: bool = False,
+    options: FitOptions | None = None,
+) -> list[Array]:
+    """Return simulated minus logged outputs of each log, as `axisight.fit` compares them.
+
+    Arrays are (n, n_axes): motor torque commands [Nm] in closed loop, else motor positions [rad]. With
+    ``joints`` they are (n, 2 n_axes): the angles of the driven joints [rad] follow, without their means, and
+    zero where no encoder is. ``effects`` and ``options`` are those of `axisight.fit`. Raises InputError as it
+    does.
+    """
+    chosen = options or FitOptions()
+    n = robot.n_axes
+    ready, every = simulated_logs(
+        robot,
+        logs,
+        robot.placed(effects),
+        joint_weighting=Weighting.flat(n) if joints else None,
+        options=chosen,
+    )
+    at = ready.evaluate(core_effects(every), [], chosen)
+    if isinstance(at, Diverged):
+        raise InputError(f"robot: expected a model that can be simulated along the logs, {at}")
+    outputs = 2 * n if joints else n
+    lengths = [outputs * log.n_samples for log in logs]
+    parts = np.split(at.residual, np.cumsum(lengths)[:-1])
+    return [part.reshape(outputs, -1).T for part in parts]
