@@ -12,6 +12,7 @@ from axisight.excitation.multisine import (
     random_phases,
     schroeder_phases,
 )
+from axisight.excitation.optimal import OptimalSpectrum, optimal_spectrum
 from axisight.excitation.references import References, references
 from axisight.excitation.signals import (
     PeriodicSignal,
@@ -34,6 +35,7 @@ __all__ = [
     "Limits",
     "LpRefinement",
     "Multisine",
+    "OptimalSpectrum",
     "PeriodicSignal",
     "References",
     "SteppedSine",
@@ -46,6 +48,7 @@ __all__ = [
     "line_set",
     "load_design",
     "multisine",
+    "optimal_spectrum",
     "optimize_crest_factor",
     "prbs",
     "random_phases",

@@ -12,6 +12,7 @@ of Axisight, and `of_matrix` from any information matrix.
 from axisight.identifiability.assessment import Combination, Identifiability, identifiability
 from axisight.identifiability.comparison import compare_experiments, recommend_experiments
 from axisight.identifiability.information import Information, information, of_matrix
+from axisight.identifiability.shares import OptimalShares, optimal_shares
 from axisight.identifiability.sources import (
     of_covariance,
     of_fit,
@@ -24,6 +25,7 @@ __all__ = [
     "Combination",
     "Identifiability",
     "Information",
+    "OptimalShares",
     "compare_experiments",
     "identifiability",
     "information",
@@ -33,5 +35,6 @@ __all__ = [
     "of_matrix",
     "of_regressor",
     "of_simulation",
+    "optimal_shares",
     "recommend_experiments",
 ]
