@@ -24,6 +24,7 @@ from axisight.excitation.signals import (
     stepped_sine,
     triangle,
 )
+from axisight.excitation.zippered import simultaneous_references, zippered
 
 __all__ = [
     "Clipping",
@@ -56,8 +57,10 @@ __all__ = [
     "read_references",
     "references",
     "schroeder_phases",
+    "simultaneous_references",
     "square",
     "stepped_sine",
     "triangle",
     "write_references",
+    "zippered",
 ]

@@ -29,9 +29,9 @@ from axisight.errors import InputError
 from axisight.excitation.directions import Directions, direction_matrix
 from axisight.excitation.multisine import Multisine
 from axisight.fitting import Parameter
-from axisight.frequency_fit.line_information import POWERS, LineInformation, Power, line_information
+from axisight.frequency_fit.line_information import LineInformation, Power, line_information
 from axisight.frequency_fit.parameters import specs
-from axisight.identifiability import OptimalShares, optimal_shares
+from axisight.identifiability import OptimalEffort, optimal_effort
 from axisight.robot import Robot
 
 ALL = "all"
@@ -42,6 +42,15 @@ Parameters = Sequence[str | Parameter] | Mapping[str, float]
 Criterion = Literal["determinant", "variance", "relative_response", "absolute_response"]
 
 
+Limited = Literal["torque", "velocity", "reference", "both"]
+_LIMITED: dict[Limited, tuple[Power, ...]] = {
+    "torque": ("torque",),
+    "velocity": ("velocity",),
+    "reference": ("reference",),
+    "both": ("torque", "velocity"),
+}
+
+
 @summarized
 @dataclass(frozen=True, eq=False)
 class OptimalSpectrum:
@@ -49,31 +58,34 @@ class OptimalSpectrum:
 
     signal
         The multisine: lines with power, optimal amplitudes, phases of the flat multisine.
-    criterion, power
-        What is minimized, and the quantity whose total power equals that of the flat multisine.
-    rms
-        Root mean square of this quantity over axes and experiments, of both signals.
+    criterion, limited
+        What is minimized, and the power that does not exceed that of the flat multisine.
+    rms, flat_rms
+        Root mean squares over axes and experiments of motor ``torque`` [Nm], motor ``velocity`` and
+        ``reference`` [rad/s], of this signal and of the flat one.
     lines, shares
-        Candidate lines and the share of the power of each, (n_lines,); ``flat_shares`` are those of
-        the flat multisine.
+        Candidate lines and the share of the limited power of each, (n_lines,). If two powers are
+        limited, it is a share of their weighted sum. ``flat_shares`` are those of the flat multisine.
     dispersion
-        d_k of the equivalence theorem, (n_lines,), relative to its bound: no value exceeds one by more
-        than ``gap`` if the spectrum is optimal. NaN for responses, which have a closed form.
+        Of the equivalence theorem, (n_lines,): no value is far above one if the spectrum is optimal.
+        NaN for responses, which have a closed form.
     gain
         Criterion of the flat multisine over that of this one: ratio of variances, or for a
         determinant of the n-th root of the determinants of the information.
     relative_std, flat_relative_std
-        Predicted relative standard deviations of the parameters by name, of both signals.
+        Predicted relative standard deviations of the parameters by name, of both signals; in metres
+        for centres of mass.
     gap, status
-        As in :class:`axisight.identifiability.OptimalShares`.
+        As in :class:`axisight.identifiability.OptimalEffort`; ``"closed_form"`` for responses.
     left_out
         Effects of the robot without linear model, which the design leaves out.
     """
 
     signal: Multisine
     criterion: Criterion
-    power: Power
-    rms: float
+    limited: Limited
+    rms: dict[Power, float]
+    flat_rms: dict[Power, float]
     lines: Lines = field(repr=False)
     shares: Real
     flat_shares: Real = field(repr=False)
@@ -93,23 +105,23 @@ def optimal_spectrum(
     *,
     parameters: Parameters | None = None,
     directions: Directions | ArrayLike = "t1",
-    power: Power = "torque",
+    limited: Limited = "both",
     n_periods: int = 1,
     noise_std_rad: ArrayLike | None = None,
     operating_points_rad: ArrayLike | None = None,
     flat_share: float = 0.1,
     relative_uncertainty: float = 0.0,
-    models: int = 16,
+    models: int = 32,
     seed: int = 0,
     measured_information: ArrayLike | None = None,
     least_share: float = 1e-4,
-    tolerance: float = 1e-4,
-    max_iterations: int = 20_000,
+    tolerance: float = 1e-3,
+    max_iterations: int = 10_000,
 ) -> OptimalSpectrum:
     """Return the amplitudes that answer a question best with the power of a flat multisine.
 
     Source: Wernholt (2004), section 5.3, (5.1) to (5.3), for the closed loop: the limited power is
-    that of the torque or velocity that the references cause.
+    that of the torque and velocity that the references cause.
 
     Parameters
     ----------
@@ -125,7 +137,8 @@ def optimal_spectrum(
     parameters : all parameters that the fit estimates, as for `axisight.frequency_fit.fit_responses`.
         None takes all stiffnesses and dampings.
     directions : T of :func:`references`, the same in all experiments of this signal.
-    power : quantity whose power is limited: ``torque``, ``velocity`` (of the motors) or ``reference``.
+    limited : what may not have more power than with the flat multisine, as a sum over axes and
+        experiments: ``torque`` or ``velocity`` of the motors, ``both`` of them, or the ``reference``.
     n_periods, noise_std_rad, operating_points_rad : as for
         `axisight.frequency_fit.line_information`.
     flat_share : share of the power that stays spread as in ``flat``, for questions about parameters.
@@ -135,14 +148,14 @@ def optimal_spectrum(
     measured_information : information of earlier experiments, for example ``fit.information``,
         (n_parameters, n_parameters).
     least_share : lines with a smaller share than this part of the largest are left out.
-    tolerance, max_iterations : of the search, see `axisight.identifiability.optimal_shares`.
+    tolerance, max_iterations : of the search, see `axisight.identifiability.optimal_effort`.
 
     Raises InputError naming the field.
 
     """
     instance("robot", robot, Robot)
     instance("flat", flat, Multisine)
-    one_of("power", power, POWERS)
+    one_of("limited", limited, _LIMITED)
     linear, left_out = _linear_part(robot)
     usual = [n for n in robot.parameters() if any(fnmatchcase(n, p) for p in USUAL)]
     chosen = usual if parameters is None else parameters
@@ -155,60 +168,55 @@ def optimal_spectrum(
             directions=direction_matrix(directions, robot.n_axes),
             n_samples=flat.n_samples,
             n_periods=n_periods,
-            power=power,
             noise_std_rad=noise_std_rad,
             operating_points_rad=operating_points_rad,
         )
 
     free = tuple(s.name for s in specs(robot, chosen) if not s.frozen)
     criterion, weight = _question(optimal_for, free)
-    problem = _Problem(
-        flat, lines_of(chosen), criterion, weight, _prior(measured_information, free)
-    )
-    if criterion in RESPONSES:
-        return _result(problem, problem.response_shares(), power, left_out)
     share = not_negative("flat_share", flat_share)
     least = not_negative("least_share", least_share)
     if share >= 1 or least >= 1:
         raise InputError(f"flat_share, least_share: expected below 1, got {share:g}, {least:g}")
+    prior = _prior(measured_information, free)
+    problem = _Problem(flat, lines_of(chosen), criterion, weight, prior, limited)
+    if criterion in RESPONSES:
+        return problem.result(problem.response_variance, left_out)
     drawn = _scattered(robot, chosen, relative_uncertainty, models, seed)
     informations = [lines_of(values).information for values in drawn]
     every = np.array(informations or [problem.nominal.information])
-    every = every * problem.per_share[None, :, None, None]
-    found = optimal_shares(
+    before = flat.amplitude**2
+    found = optimal_effort(
         (1 - share) * every,
         weight=weight,
-        prior=problem.prior + share * np.einsum("k,skij->sij", problem.flat_shares, every),
+        costs=problem.costs,
+        prior=prior + share * np.einsum("k,skij->sij", before, every),
         tolerance=tolerance,
         max_iterations=max_iterations,
     )
-    shares = (1 - share) * found.shares + share * problem.flat_shares
-    kept = np.where(shares >= least * shares.max(), shares, 0.0)
-    return _result(problem, kept / kept.sum(), power, left_out, found)
+    after = (1 - share) * found.amounts + share * before
+    cost = found.prices @ problem.costs
+    used = after * cost
+    after = np.where(used >= least * used.max(), after, 0.0)
+    return problem.result(after, left_out, found)
 
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """What is minimized over which lines, at the power of the flat multisine."""
+    """What is minimized over which lines, at the powers of the flat multisine."""
 
     flat: Multisine
     nominal: LineInformation
     criterion: Criterion
     weight: Real | None
     prior: Real
+    limited: Limited
 
     @property
-    def budget(self) -> float:
-        return float(np.sum(self.flat.amplitude**2 * self.nominal.power))
-
-    @property
-    def per_share(self) -> Real:
-        """Squared amplitude of each line if it got the whole power."""
-        return np.asarray(self.budget / self.nominal.power)
-
-    @property
-    def flat_shares(self) -> Real:
-        return np.asarray(self.flat.amplitude**2 / self.per_share)
+    def costs(self) -> Real:
+        """Power for amplitude one relative to that of the flat multisine, (n_limits, n_lines)."""
+        powers = np.array([self.nominal.power[name] for name in _LIMITED[self.limited]])
+        return np.asarray(powers / (powers @ self.flat.amplitude**2)[:, None])
 
     @property
     def response_variance(self) -> Real:
@@ -217,64 +225,54 @@ class _Problem:
             return self.nominal.relative_variance
         return self.nominal.absolute_variance
 
-    def response_shares(self) -> Real:
-        """Return shares of power with equal accuracy at all lines."""
-        needed = self.response_variance * self.nominal.power
-        return np.asarray(needed / needed.sum())
+    def total(self, squared: Real) -> Real:
+        """Return the information with squared amplitudes, and what was there before."""
+        return np.asarray(self.prior + np.einsum("k,kij->ij", squared, self.nominal.information))
 
-    def total(self, shares: Real) -> Real:
-        """Return the information of the nominal model with these shares, and what was there before."""
-        amounts = shares * self.per_share
-        return np.asarray(self.prior + np.einsum("k,kij->ij", amounts, self.nominal.information))
-
-    def stds(self, shares: Real) -> dict[str, float]:
-        variance = np.diag(_inverse(self.total(shares)))
+    def stds(self, squared: Real) -> dict[str, float]:
+        variance = np.diag(_inverse(self.total(squared)))
         names = self.nominal.names
         return {name: float(np.sqrt(v)) for name, v in zip(names, variance, strict=True)}
 
-    def loss(self, shares: Real) -> float:
+    def loss(self, squared: Real) -> float:
         """Return the variance, or its geometric mean over the parameters for a determinant."""
         if self.criterion in RESPONSES:
-            return float(np.max(self.response_variance / (shares * self.per_share)))
-        matrix = self.total(shares)
+            return float(np.max(self.response_variance / squared))
+        matrix = self.total(squared)
         if self.weight is None:
             return float(np.exp(-np.linalg.slogdet(matrix)[1] / len(matrix)))
         return float(np.trace(self.weight @ _inverse(matrix)))
 
-
-def _result(
-    problem: _Problem,
-    shares: Real,
-    power: Power,
-    left_out: tuple[str, ...],
-    found: OptimalShares | None = None,
-) -> OptimalSpectrum:
-    flat, kept = problem.flat, shares > 0
-    amplitude = np.sqrt(shares * problem.per_share)
-    dispersion = np.full(len(shares), np.nan)
-    if found is not None:
-        dispersion = found.dispersion / float(found.shares @ found.dispersion)
-    return OptimalSpectrum(
-        signal=replace(
-            flat,
-            lines=flat.lines[kept],
-            amplitude=amplitude[kept],
-            phase_rad=flat.phase_rad[kept],
-        ),
-        criterion=problem.criterion,
-        power=power,
-        rms=float(np.sqrt(problem.budget)),
-        lines=flat.lines,
-        shares=shares,
-        flat_shares=problem.flat_shares,
-        dispersion=dispersion,
-        gain=problem.loss(problem.flat_shares) / problem.loss(shares),
-        relative_std=problem.stds(shares),
-        flat_relative_std=problem.stds(problem.flat_shares),
-        gap=0.0 if found is None else found.gap,
-        status="closed_form" if found is None else found.status,
-        left_out=left_out,
-    )
+    def result(
+        self, squared: Real, left_out: tuple[str, ...], found: OptimalEffort | None = None
+    ) -> OptimalSpectrum:
+        """Return the result of squared amplitudes, scaled until the first limit is reached."""
+        flat, kept, costs = self.flat, squared > 0, self.costs
+        before, after = flat.amplitude**2, squared / np.max(costs @ squared)
+        cost = (np.ones(len(costs)) / len(costs) if found is None else found.prices) @ costs
+        powers = self.nominal.power.items()
+        return OptimalSpectrum(
+            signal=replace(
+                flat,
+                lines=flat.lines[kept],
+                amplitude=np.sqrt(after[kept]),
+                phase_rad=flat.phase_rad[kept],
+            ),
+            criterion=self.criterion,
+            limited=self.limited,
+            rms={name: float(np.sqrt(p @ after)) for name, p in powers},
+            flat_rms={name: float(np.sqrt(p @ before)) for name, p in powers},
+            lines=flat.lines,
+            shares=after * cost / (after @ cost),
+            flat_shares=before * cost / (before @ cost),
+            dispersion=np.full(len(after), np.nan) if found is None else found.dispersion,
+            gain=self.loss(before) / self.loss(after),
+            relative_std=self.stds(after),
+            flat_relative_std=self.stds(before),
+            gap=0.0 if found is None else found.gap,
+            status="closed_form" if found is None else found.status,
+            left_out=left_out,
+        )
 
 
 def _linear_part(robot: Robot) -> tuple[Robot, tuple[str, ...]]:

@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
-from axisight.arguments import one_of, reals, whole
+from axisight.arguments import reals, whole
 from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.fitting import Parameter
 from axisight.frequency_fit.measured import MeasuredResponse, model_response
 from axisight.frequency_fit.options import FrequencyFitOptions, core_options
 from axisight.frequency_fit.parameters import Spec, specs
-from axisight.frf.leakage import noise_leakage_power
 from axisight.frf.loop import robot_loop
 from axisight.robot import Robot
 
@@ -25,7 +24,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 Power = Literal["torque", "velocity", "reference"]
-POWERS: tuple[Power, ...] = ("torque", "velocity", "reference")
+UNITS: dict[Power, str] = {"torque": "Nm", "velocity": "rad/s", "reference": "rad/s"}
 
 
 @summarized
@@ -40,7 +39,8 @@ class LineInformation:
     information
         M_k, (n_freq, n, n), from all experiments together.
     power
-        Mean square of the limited quantity over axes and experiments, (n_freq,).
+        Mean squares over axes and experiments, (n_freq,), of motor ``torque`` [Nm^2], motor ``velocity``
+        and ``reference`` [(rad/s)^2].
     relative_variance, absolute_variance
         Mean over the elements of the variance of the response, (n_freq,), relative to ``|G|^2``, and in
         (rad/Nm)^2.
@@ -53,7 +53,7 @@ class LineInformation:
     names: tuple[str, ...]
     logarithmic: tuple[bool, ...]
     information: Real = field(repr=False)
-    power: Real
+    power: dict[Power, Real]
     relative_variance: Real
     absolute_variance: Real
 
@@ -66,7 +66,6 @@ def line_information(
     directions: ArrayLike,
     n_samples: int,
     n_periods: int = 1,
-    power: Power = "torque",
     noise_std_rad: ArrayLike | None = None,
     operating_points_rad: ArrayLike | None = None,
 ) -> LineInformation:
@@ -85,13 +84,10 @@ def line_information(
         T, (n_axes, n_experiments), of full row rank: experiment e has the references ``T_e r_0(t)``.
     n_samples, n_periods
         Samples of a period, and measured periods; they average the noise.
-    power
-        Quantity whose power is limited: ``torque`` [Nm] or ``velocity`` [rad/s] of the motors, or the
-        ``reference`` [rad/s].
     noise_std_rad
         Noise of the measured motor angles, as the standard deviation of white noise of the same
-        spectral density: a number, (n_freq,) or (n_freq, n_axes) [rad]. None takes the sensor noise
-        of the robot with its leakage in the loop.
+        spectral density: a number, (n_freq,) or (n_freq, n_axes) [rad]. None takes the sensor noise of
+        the robot. Leakage is left out: estimate with `axisight.frf.local_polynomial`, which removes it.
     operating_points_rad
         Angles of the driven joints [rad], (n_points, n_axes); None for the operating point of the
         robot. Information adds up over points; power is their mean.
@@ -99,7 +95,6 @@ def line_information(
     Raises InputError for misuse, and for effects of the robot without a linear model.
     """
     f = reals("frequency_hz", frequency_hz, "frequencies of shape (n_freq,)", 1)
-    one_of("power", power, POWERS)
     n = whole("n_samples", n_samples)
     periods = whole("n_periods", n_periods)
     turned = reals("directions", directions, f"shape ({robot.n_axes}, n_experiments)", 2)
@@ -116,17 +111,17 @@ def line_information(
     for point in points:
         here = robot.with_operating_point(point)
         noise = _noise_power(here, f, n, periods, noise_std_rad) / (n / 2) ** 2
-        found.append(_at_point(here, chosen, f, turned, noise, power))
-    matrices, powers, relative, absolute = (np.array(part) for part in zip(*found, strict=True))
+        found.append(_at_point(here, chosen, f, turned, noise))
+    matrices, powers, relative, absolute = zip(*found, strict=True)
     free = [s for s in chosen if not s.frozen]
     return LineInformation(
         frequency_hz=f,
         names=tuple(s.name for s in free),
         logarithmic=tuple(s.logarithmic for s in free),
-        information=matrices.sum(axis=0),
-        power=powers.mean(axis=0),
-        relative_variance=relative.mean(axis=0),
-        absolute_variance=absolute.mean(axis=0),
+        information=np.sum(matrices, axis=0),
+        power={name: np.mean([p[name] for p in powers], axis=0) for name in UNITS},
+        relative_variance=np.mean(relative, axis=0),
+        absolute_variance=np.mean(absolute, axis=0),
     )
 
 
@@ -136,13 +131,11 @@ def _noise_power(
     """Return ``E|V|^2`` [rad^2] of the mean period, (n_freq, n_axes)."""
     shape = (len(f), robot.n_axes)
     if noise_std_rad is None:
-        leaked = noise_leakage_power(robot, f, n_samples * n_periods)
-        total = n_samples * robot.position_noise_std**2 / n_periods + leaked / n_periods**2
-        if not (total > 0).all():
+        if not robot.position_noise_std > 0:
             raise InputError(
                 "noise_std_rad: expected a number, because the robot has no sensor noise, got None"
             )
-        return np.asarray(total)
+        noise_std_rad = robot.position_noise_std
     std = reals("noise_std_rad", noise_std_rad, "positive numbers", (0, 1, 2))
     std = std[:, None] if std.ndim == 1 else std
     try:
@@ -155,9 +148,9 @@ def _noise_power(
 
 
 def _at_point(
-    robot: Robot, chosen: Sequence[Spec], f: Real, directions: Real, noise: Real, power: Power
-) -> tuple[Real, Real, Real, Real]:
-    """Return information, power, relative and absolute variance at an operating point."""
+    robot: Robot, chosen: Sequence[Spec], f: Real, directions: Real, noise: Real
+) -> tuple[Real, dict[Power, Real], Real, Real]:
+    """Return information, powers, relative and absolute variance at an operating point."""
     loop = robot_loop(robot, f)
     g, n = loop.response, robot.n_axes
     to_torque = np.linalg.inv(np.eye(n) + loop.controller @ g) @ loop.controller @ loop.prefilter
@@ -168,16 +161,16 @@ def _at_point(
     covariance = np.einsum("ki,ij,kml->kimjl", noise, np.eye(n), shared).reshape(-1, n * n, n * n)
     own = np.einsum("kmm->km", shared).real
     variance = noise[:, :, None] * own[:, None, :]
-    quantity = {
+    quantity: dict[Power, Complex] = {
         "torque": u,
         "velocity": 2j * np.pi * f[:, None, None] * (g @ u),
         "reference": np.broadcast_to(directions, u.shape),
-    }[power]
+    }
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = np.where(g != 0, variance / np.abs(g) ** 2, np.nan)
     return (
         _information(robot, chosen, f, covariance),
-        0.5 * np.mean(np.abs(quantity) ** 2, axis=(1, 2)),
+        {name: 0.5 * np.mean(np.abs(x) ** 2, axis=(1, 2)) for name, x in quantity.items()},
         np.nanmean(relative, axis=(1, 2)),
         variance.mean(axis=(1, 2)),
     )

@@ -11,8 +11,8 @@ of Axisight, and `of_matrix` from any information matrix.
 
 from axisight.identifiability.assessment import Combination, Identifiability, identifiability
 from axisight.identifiability.comparison import compare_experiments, recommend_experiments
+from axisight.identifiability.effort import OptimalEffort, optimal_effort
 from axisight.identifiability.information import Information, information, of_matrix
-from axisight.identifiability.shares import OptimalShares, optimal_shares
 from axisight.identifiability.sources import (
     of_covariance,
     of_fit,
@@ -25,7 +25,7 @@ __all__ = [
     "Combination",
     "Identifiability",
     "Information",
-    "OptimalShares",
+    "OptimalEffort",
     "compare_experiments",
     "identifiability",
     "information",
@@ -35,6 +35,6 @@ __all__ = [
     "of_matrix",
     "of_regressor",
     "of_simulation",
-    "optimal_shares",
+    "optimal_effort",
     "recommend_experiments",
 ]
