@@ -2,7 +2,7 @@
 
     python benches/optimal_spectrum.py [RUNS]
 
-Robots in their loop, linear, with sensor noise of 3e-4 rad. Signals have 1-40 Hz and a period of 10 s; one period of
+Robots in their loop, linear, with sensor noise of 1e-4 rad. Signals have 1-40 Hz and a period of 10 s; one period of
 waiting before the measured ones. What is equal between the designs: neither the mean square of the motor torque nor
 that of the motor speed, over axes and experiments, exceeds that of the flat spectrum. The number of measured periods
 is the same. Every run fits all stiffnesses and dampings.
@@ -35,7 +35,7 @@ from axisight.frequency_fit.line_information import Power
 from axisight.frf import local_polynomial
 from axisight.records import PeriodicRecords
 
-NOISE = "3.0e-4"
+NOISE = "1.0e-4"
 RMS_RAD_S = 0.2
 QUESTIONS = (
     ("two_mass_axis", "axis1.stiffness"),
