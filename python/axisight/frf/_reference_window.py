@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +73,8 @@ def fit_windows(
     powers = x[:, :, None] ** np.arange(order + 1)
     columns = (r[:, :, :, None] * powers[:, :, None, :]).reshape(*x.shape, -1)
     size = np.linalg.norm(columns, axis=1, keepdims=True)
-    columns /= np.where(size > 0, size, 1.0)
+    size = np.where(size > 0, size, 1.0)
+    columns /= size
     full_rank = _full_rank(columns)
     columns[~full_rank] = np.eye(columns.shape[1], columns.shape[2])
     d = np.ones(x.shape, np.complex128)
@@ -141,5 +143,5 @@ def _rms(values: Complex, axis: int) -> Real:
     return np.asarray(np.where(found > 0, found, 1.0))
 
 
-def _adjoint(values: Complex) -> Complex:
-    return np.conj(np.swapaxes(values, -1, -2))
+def _adjoint(values: NDArray[Any]) -> Complex:
+    return np.asarray(np.conj(np.swapaxes(values, -1, -2)), np.complex128)

@@ -17,7 +17,7 @@ from axisight.frf._lines import (
     output_unit,
     provenance,
 )
-from axisight.frf._reference_window import Windows, fit_windows, windows_of
+from axisight.frf._reference_window import Windows, fit_windows
 from axisight.frf.local_window import DEGREES_OF_FREEDOM, HIGHEST_ORDER
 from axisight.frf.response import Flag, frequency_response
 from axisight.records.periodic import PeriodicRecords
@@ -56,9 +56,7 @@ def local_joint_input_output(
         is smoother than the position.
 
     ``variance`` follows from the residuals of ``Y - G U`` in the window, with ``degrees_of_freedom``
-    complex degrees of freedom. It includes noise, nonlinear distortion and lack of fit. With several
-    periods ``noise_variance`` is the share of noise alone, from the scatter of the periods. If
-    ``variance`` is much larger, the lines are too far apart, or the distortion is large.
+    complex degrees of freedom. It includes noise, nonlinear distortion and lack of fit.
 
     Bias: none from noise, to first order, because the reference is known exactly. The local model
     has a bias if a resonance of the closed loop is narrow. Keep the lines of one input at most a
@@ -95,21 +93,16 @@ def local_joint_input_output(
     )
     condition, flag = condition_and_flag(found.response[:, n_out:])
     flag = np.where(found.full_rank, flag, Flag.RANK_DEFICIENT).astype(np.int8)
-    response, gain, variance = _divided(found, n_out, flag, freedom)
+    response, variance = _divided(found, n_out, flag, freedom)
     chosen = np.isin(used, wanted)
     factor = (line_factor(used / (records.n_samples * records.sample_time_s), quantity) / velocity)[
         :, None, None
     ]
-    noise = None
-    if records.n_periods > 1:
-        noise = _noise(y - np.einsum("kij,kjep->kiep", response, u), used, count)
-        noise = noise[:, :, None] * gain[:, None, :] * np.abs(factor) ** 2
     return frequency_response(
         used[chosen] / (records.n_samples * records.sample_time_s),
         (response * factor)[chosen],
         estimator="local_joint_input_output",
         variance=(variance * np.abs(factor) ** 2)[chosen],
-        noise_variance=None if noise is None else noise[chosen],
         condition=condition[chosen],
         flag=flag[chosen],
         input_unit=records.input_unit,
@@ -156,10 +149,8 @@ def _count(
     return count
 
 
-def _divided(
-    found: Windows, n_out: int, flag: np.ndarray, freedom: float
-) -> tuple[Complex, Real, Real]:
-    """Return G, the gain of noise to each column of G, and the variance of G."""
+def _divided(found: Windows, n_out: int, flag: np.ndarray, freedom: float) -> tuple[Complex, Real]:
+    """Return G and its variance."""
     to_output, to_input = found.response[:, :n_out], found.response[:, n_out:]
     lost = np.isin(flag, (Flag.RANK_DEFICIENT, Flag.NO_EXCITATION))
     inverse = np.full(to_input.shape, np.nan, np.complex128)
@@ -184,12 +175,4 @@ def _divided(
                 optimize=True,
             ).real
         )
-    return g, gain, variance
-
-
-def _noise(error: Complex, lines: Lines, count: int) -> Real:
-    """Return the noise power of the mean period, from its scatter over a window, (n_freq, n_out)."""
-    periods = error.shape[3]
-    off = error - error.mean(axis=3, keepdims=True)
-    power = np.sum(np.abs(off) ** 2, axis=3).mean(axis=2) / (periods * (periods - 1))
-    return np.asarray(power[windows_of(lines, count)].mean(axis=1))
+    return g, variance
