@@ -32,7 +32,7 @@ from axisight.frequency_fit import (
     line_information,
 )
 from axisight.frequency_fit.line_information import Power
-from axisight.frf import local_polynomial
+from axisight.frf import local_polynomial, with_input_covariance
 from axisight.records import PeriodicRecords
 
 NOISE = "1.0e-4"
@@ -69,7 +69,7 @@ def measure(
         run[x].values[:, made.n_samples :].reshape(shape) for x in ("torque_cmd_nm", "position_rad")
     )
     records = PeriodicRecords(robot.sample_time_s, u, y, made.lines)
-    found = local_polynomial(records, threads=1)
+    found = with_input_covariance(local_polynomial(records, threads=1), records)
     spectra = {
         "torque": np.fft.rfft(u.mean(axis=1), axis=1)[:, made.lines],
         "velocity": np.fft.rfft(y.mean(axis=1), axis=1)[:, made.lines]
@@ -79,7 +79,8 @@ def measure(
         name: float(np.sqrt(2 * np.sum(np.abs(x) ** 2, axis=1).mean()) / made.n_samples)
         for name, x in spectra.items()
     }
-    return MeasuredResponse.of(robot.operating_point, found), rms
+    data = MeasuredResponse.of(robot.operating_point, found, covariance=found["covariance"])
+    return data, rms
 
 
 def fitted(robot: Robot, data: list[MeasuredResponse]) -> dict[str, float]:

@@ -90,7 +90,8 @@ def row(period_s: float, factor: float, runs: int, **options) -> str:
 def main(runs: int) -> None:
     """Print the table."""
     print(
-        "period  lines  noise  std (median)  ratio  per time  smoothed  coverage  lowest band  bias (median)  bias (largest)"
+        "period  lines  noise  std (median)  ratio  per time  smoothed  coverage  lowest band"
+        "  bias (median)  bias (largest)"
     )
     for period_s in (5.0, 10.0, 20.0):
         for factor in (1.0, 10.0, 100.0):

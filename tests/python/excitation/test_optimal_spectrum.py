@@ -26,7 +26,7 @@ from axisight.frequency_fit import (
     line_information,
     model_response,
 )
-from axisight.frf import local_polynomial, robot_loop
+from axisight.frf import local_polynomial, robot_loop, with_input_covariance
 from axisight.records import PeriodicRecords
 
 QUESTION = "axis1.stiffness"
@@ -126,8 +126,9 @@ def response_of(robot: Robot, signal: Multisine, seed: int) -> MeasuredResponse:
     u, y = (
         run[x].values[:, made.n_samples :].reshape(shape) for x in ("torque_cmd_nm", "position_rad")
     )
-    found = local_polynomial(PeriodicRecords(robot.sample_time_s, u, y, made.lines), threads=1)
-    return MeasuredResponse.of(robot.operating_point, found)
+    records = PeriodicRecords(robot.sample_time_s, u, y, made.lines)
+    found = with_input_covariance(local_polynomial(records, threads=1), records)
+    return MeasuredResponse.of(robot.operating_point, found, covariance=found["covariance"])
 
 
 def estimate(robot: Robot, data: list[MeasuredResponse]) -> tuple[float, Robot]:

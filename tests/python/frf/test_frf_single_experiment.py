@@ -196,7 +196,7 @@ def test_misuse_is_named(arm: Robot) -> None:
     with pytest.raises(InputError, match="half_width"):
         local_joint_input_output(records, half_width=2)
     with pytest.raises(InputError, match="lines: expected excited lines"):
-        local_joint_input_output(records, lines=[3])
+        local_joint_input_output(records, lines=np.array([3]))
 
 
 def test_loop_is_the_reason_for_the_reference(arm: Robot) -> None:

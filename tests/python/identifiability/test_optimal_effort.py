@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.optimize import Bounds, LinearConstraint, minimize
 
 from axisight.errors import InputError
 from axisight.identifiability import optimal_effort
@@ -50,10 +50,12 @@ def test_equivalence_theorem(criterion: str) -> None:
 @pytest.mark.parametrize("limits", [1, 2])
 def test_slsqp_finds_the_same_optimum(criterion: str, limits: int) -> None:
     m, c = candidates(2, count=8), weights(3)[criterion]
+    # The prior keeps the matrix regular wherever SLSQP looks.
+    prior = 0.01 * np.eye(3)
     costs = np.random.default_rng(3).uniform(0.5, 2.0, (limits, 8))
 
     def loss(a: Real) -> float:
-        total = np.einsum("k,kij->ij", a, m)
+        total = prior + np.einsum("k,kij->ij", a, m)
         if c is None:
             return -float(np.linalg.slogdet(total)[1])
         return float(np.log(np.trace(c @ np.linalg.inv(total))))
@@ -63,11 +65,13 @@ def test_slsqp_finds_the_same_optimum(criterion: str, limits: int) -> None:
         loss,
         start,
         method="SLSQP",
-        bounds=[(0, None)] * 8,
-        constraints={"type": "ineq", "fun": lambda a: 1 - costs @ a},
+        bounds=Bounds(0, np.inf),
+        constraints=LinearConstraint(costs, -np.inf, 1.0),
         options={"ftol": 1e-12, "maxiter": 1000},
     )
-    found = optimal_effort(m, weight=c, costs=costs, tolerance=1e-5, max_iterations=200_000)
+    found = optimal_effort(
+        m, weight=c, costs=costs, prior=prior, tolerance=1e-5, max_iterations=200_000
+    )
     assert found.status == "converged"
     assert (costs @ found.amounts <= 1 + 1e-12).all()
     # The gap bounds the distance from the optimum; SLSQP is accurate to about 1e-6.
