@@ -21,7 +21,7 @@ import axisight
 from axisight import Effect, excitation, frf, records
 from axisight.blind.plots import plot_calibration, plot_confusion
 from axisight.cli.demo import write_demo_case
-from axisight.excitation.plots import plot_references, plot_signal
+from axisight.excitation.plots import plot_optimal_spectrum, plot_references, plot_signal
 from axisight.responses import plot_levels
 
 PAGE = Path(__file__).resolve().parent / "plots.md"
@@ -85,6 +85,11 @@ SHOWN = {
         "made",
         "References of all experiments of a design.",
     ),
+    "axisight.excitation.plots.plot_optimal_spectrum": (
+        "optimal",
+        "Share of the power of every line, flat and optimal, and the dispersion that proves the optimum "
+        "([optimal experiments](optimal_design.md)).",
+    ),
     "axisight.blind.plots.plot_confusion": (
         "score",
         "Confusion matrix of a benchmark: true causes against causes named first ([how often it is right](truth.md)).",
@@ -102,6 +107,8 @@ def figures() -> dict[str, Callable[[], Figure]]:
     tones = excitation.multisine(1.0, robot.sample_time_s, band_hz=(2.0, 60.0), seed=0)
     signal = excitation.optimize_crest_factor(tones, starts=4).signal.scaled(peak=8.0)
     made = excitation.references(signal, robot.n_axes, directions="t2")
+    flat = excitation.multisine(10.0, robot.sample_time_s, band_hz=(1.0, 40.0)).scaled(rms=4.0)
+    optimal = excitation.optimal_spectrum(robot, flat, "axis1.stiffness")
     reference = np.tile(made.period, (1, 24, 1))
     runs = axisight.simulate_batch(robot, reference, noise_seed=0)
     experiments = [
@@ -134,6 +141,7 @@ def figures() -> dict[str, Callable[[], Figure]]:
         "plot_levels": lambda: plot_levels(with_distortion()),
         "plot_signal": lambda: plot_signal(signal),
         "plot_references": lambda: plot_references(made),
+        "plot_optimal_spectrum": lambda: plot_optimal_spectrum(optimal),
         "plot_confusion": lambda: plot_confusion(score),
         "plot_calibration": lambda: plot_calibration(score),
     }

@@ -106,6 +106,7 @@ __all__ = [
     "EffectInfo",
     "FitOptions",
     "Fitted",
+    "Harmonic",
     "InputError",
     "Load",
     "Log",
@@ -133,6 +134,7 @@ __all__ = [
     "load_robot",
     "montecarlo",
     "mujoco",
+    "paths",
     "plot_bode",
     "plot_gap_map",
     "plot_log",
@@ -145,6 +147,7 @@ __all__ = [
     "read_case",
     "read_log",
     "records",
+    "resolver_ripple",
     "responses",
     "rigid_body",
     "robot_export",
@@ -159,7 +162,6 @@ __all__ = [
     "spectral_weighting",
     "to_mujoco",
     "to_pinocchio",
+    "torque_ripple",
     "write_back",
 ]
-
-__version__: str

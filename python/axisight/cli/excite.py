@@ -22,7 +22,15 @@ from axisight.cli.robot import (
 )
 from axisight.cli.screen import OUT
 from axisight.errors import InputError
-from axisight.excitation import Excited, excite, load_design, read_design, write_references
+from axisight.excitation import (
+    Excited,
+    OptimalSpectrum,
+    excite,
+    load_design,
+    read_design,
+    write_references,
+)
+from axisight.excitation.design import ZIPPERED
 from axisight.excitation.files import reference_files
 from axisight.excitation.plots import plot_references, plot_signal
 from axisight.robot_import import is_model_file
@@ -79,7 +87,42 @@ def excite_command(
         str | None,
         typer.Option(
             rich_help_panel=SIGNAL,
-            help="Directions of the axes by experiment: t1, t2, hadamard or dft.",
+            help="Directions of the axes by experiment: t1, t2, hadamard, dft or zippered.",
+        ),
+    ] = None,
+    zippered: Annotated[
+        bool,
+        typer.Option(
+            "--zippered",
+            rich_help_panel=SIGNAL,
+            help="One experiment in which each axis has its own lines; the same as --directions "
+            "zippered. Estimate with local_joint_input_output.",
+        ),
+    ] = False,
+    optimal_for: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="QUESTION",
+            rich_help_panel=SIGNAL,
+            help="Put the power where it answers a question best: a parameter such as "
+            "axis1.stiffness, by name or with wildcards (repeatable), all, relative_response or "
+            "absolute_response.",
+        ),
+    ] = None,
+    limited: Annotated[
+        str | None,
+        typer.Option(
+            rich_help_panel=SIGNAL,
+            help="Power that the optimal spectrum shares out: torque, velocity, reference or both "
+            "(torque and velocity, the default).",
+        ),
+    ] = None,
+    uncertainty: Annotated[
+        float | None,
+        typer.Option(
+            rich_help_panel=SIGNAL,
+            help="Relative standard deviation of the parameters of the model that the optimal "
+            "spectrum has to bear, e.g. 0.2.",
         ),
     ] = None,
     realizations: Annotated[
@@ -155,6 +198,10 @@ def excite_command(
         )
         _replace(data, "signal", peak_rad_s=peak_rad_s, grid=grid, phases=phases)
         _replace(data, "signal", seed=seed, starts=starts, time_s=time_s)
+        optimal = {"optimal_for": optimal_for or None, "limited": limited}
+        _replace(data, "optimal", **optimal, relative_uncertainty=uncertainty)
+        if zippered and directions not in (None, ZIPPERED):
+            raise InputError(f"--zippered, --directions: expected one of them, got {directions}")
         wave = _numbers("--square", square)
         if wave is not None:
             if len(wave) != 2:
@@ -169,7 +216,7 @@ def excite_command(
         _replace(data, "limits", **limits)
         top = {
             "robot": robot,
-            "directions": directions,
+            "directions": ZIPPERED if zippered else directions,
             "realizations": realizations,
             "dc_level_rad_s": dc_level_rad_s,
         }
@@ -198,20 +245,36 @@ def excite_command(
 
 
 def _show(made: Excited) -> None:
-    signal = made.signal
-    OUT.print(
-        f"crest factor {signal.crest_factor:.4f}, peak {signal.peak:.4g} rad/s, "
-        f"{len(signal.lines)} lines, period {signal.period_s:g} s, "
-        f"{counted(made.references.n_experiments, 'experiment')}"
-    )
-    if made.search is not None:
-        found = made.search
+    for number, signal in enumerate(made.signals, 1):
+        axis = f"axis {number}: " if len(made.signals) > 1 else ""
+        OUT.print(
+            f"{axis}crest factor {signal.crest_factor:.4f}, peak {signal.peak:.4g} rad/s, "
+            f"{len(signal.lines)} lines, period {signal.period_s:g} s, "
+            f"{counted(made.references.n_experiments, 'experiment')}"
+        )
+    for found in made.searches:
         OUT.print(
             f"best of {counted(len(found.crest_factors), 'start')}: number {found.start}, seed {found.seed} "
             f"({found.status})"
         )
+    if made.optimal is not None:
+        _show_optimal(made.optimal)
     if made.report is not None:
         say(str(made.report))
+
+
+def _show_optimal(found: OptimalSpectrum) -> None:
+    limits = "torque and velocity" if found.limited == "both" else found.limited
+    what = {
+        "variance": "variance of what you asked for",
+        "determinant": "mean variance of all parameters",
+    }.get(found.criterion, "largest variance of the response")
+    OUT.print(
+        f"optimal spectrum: {what} {1 / found.gain:.3g} times that of a flat spectrum with the same "
+        f"power of the {limits} ({found.status})"
+    )
+    if found.left_out:
+        OUT.print(f"left out of the design, no linear model: {', '.join(found.left_out)}")
 
 
 def _draw(made: Excited, path: Path) -> list[Path]:

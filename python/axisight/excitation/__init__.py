@@ -12,6 +12,7 @@ from axisight.excitation.multisine import (
     random_phases,
     schroeder_phases,
 )
+from axisight.excitation.optimal import OptimalSpectrum, optimal_spectrum
 from axisight.excitation.references import References, references
 from axisight.excitation.signals import (
     PeriodicSignal,
@@ -23,6 +24,7 @@ from axisight.excitation.signals import (
     stepped_sine,
     triangle,
 )
+from axisight.excitation.zippered import simultaneous_references, zippered
 
 __all__ = [
     "Clipping",
@@ -34,6 +36,7 @@ __all__ = [
     "Limits",
     "LpRefinement",
     "Multisine",
+    "OptimalSpectrum",
     "PeriodicSignal",
     "References",
     "SteppedSine",
@@ -46,6 +49,7 @@ __all__ = [
     "line_set",
     "load_design",
     "multisine",
+    "optimal_spectrum",
     "optimize_crest_factor",
     "prbs",
     "random_phases",
@@ -53,8 +57,10 @@ __all__ = [
     "read_references",
     "references",
     "schroeder_phases",
+    "simultaneous_references",
     "square",
     "stepped_sine",
     "triangle",
     "write_references",
+    "zippered",
 ]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -16,7 +17,8 @@ from axisight.errors import InputError
 from axisight.excitation.crest import CrestSearch, optimize_crest_factor
 from axisight.excitation.limits import LimitReport, Limits, check_limits
 from axisight.excitation.lines import Grid
-from axisight.excitation.multisine import Multisine, multisine
+from axisight.excitation.multisine import Multisine, multisine, schroeder_phases
+from axisight.excitation.optimal import ALL, OptimalSpectrum, optimal_spectrum
 from axisight.excitation.references import References, references
 from axisight.excitation.signals import (
     PeriodicSignal,
@@ -27,6 +29,7 @@ from axisight.excitation.signals import (
     stepped_sine,
     triangle,
 )
+from axisight.excitation.zippered import simultaneous_references, zippered
 from axisight.robot import Robot, load_robot
 from axisight.robot.presets import PRESETS
 
@@ -35,6 +38,8 @@ Count = Annotated[int, Field(ge=1)]
 Seed = Annotated[int, Field(ge=0, lt=2**64)]
 PerAxis = Positive | list[Positive]
 T = TypeVar("T")
+Signals = tuple[Multisine | PeriodicSignal, ...]
+ZIPPERED = "zippered"
 
 
 class _Part(BaseModel):
@@ -72,6 +77,21 @@ class SignalDesign(_Part):
     hold: Count = 1
 
 
+class OptimalDesign(_Part):
+    """The optimal power of the lines of a multisine; the fields are those of `optimal_spectrum`.
+
+    The signal then has the peak ``peak_rad_s`` again, so give limits to check torque and velocity.
+    """
+
+    optimal_for: str | list[str] = ALL
+    parameters: list[str] | None = None
+    limited: Literal["torque", "velocity", "reference", "both"] = "both"
+    noise_std_rad: Positive | None = None
+    flat_share: Annotated[float, Field(ge=0, lt=1)] = 0.1
+    relative_uncertainty: Annotated[float, Field(ge=0)] = 0.0
+    models: Count = 32
+
+
 class SquareDesign(_Part):
     """The smoothed square wave on all axes, Wernholt (2004), (7.3)."""
 
@@ -98,16 +118,20 @@ class LimitDesign(_Part):
 class ExcitationDesign(_Part):
     """The design of references for a robot (file or preset).
 
-    ``directions`` is ``"t1"``, ``"t2"``, ``"hadamard"``, ``"dft"`` or a matrix with one row per axis
-    and one column per experiment. ``realizations`` is the number of sets of these experiments; each has phases
-    of its own, at the same lines. Without ``limits`` there is no simulation.
+    ``directions`` is ``"t1"``, ``"t2"``, ``"hadamard"``, ``"dft"``, a matrix with one row per axis and one
+    column per experiment, or ``"zippered"`` for a single experiment in which each axis has its own
+    lines. ``realizations`` is the number of sets of these experiments; each has phases of its own, at the
+    same lines. Without ``limits`` there is no simulation.
     """
 
     schema_: Annotated[Literal["axisight.excite/1"], Field(alias="schema")] = "axisight.excite/1"
     robot: str
     signal: SignalDesign
-    directions: Literal["t1", "identity", "t2", "hadamard", "dft"] | list[list[float]] = "t1"
+    directions: (
+        Literal["t1", "identity", "t2", "hadamard", "dft", "zippered"] | list[list[float]]
+    ) = "t1"
     realizations: Count = 1
+    optimal: OptimalDesign | None = None
     square: SquareDesign | None = None
     dc_level_rad_s: float | list[float] = 0.0
     limits: LimitDesign | None = None
@@ -116,12 +140,27 @@ class ExcitationDesign(_Part):
 @summarized
 @dataclass(frozen=True, eq=False)
 class Excited:
-    """The result of a design: references, signal, and the phase search and limit check if it has them."""
+    """The result of a design: references, signals, and what the design has besides.
+
+    ``signals`` are one for all axes, or one per axis (``"zippered"``); ``searches`` those for their
+    phases. ``optimal`` is the optimal spectrum, and ``report`` the check of the limits.
+    """
 
     references: References
-    signal: Multisine | PeriodicSignal
-    search: CrestSearch | None
+    signals: tuple[Multisine | PeriodicSignal, ...]
+    searches: tuple[CrestSearch, ...]
     report: LimitReport | None
+    optimal: OptimalSpectrum | None = None
+
+    @property
+    def signal(self) -> Multisine | PeriodicSignal:
+        """The first signal."""
+        return self.signals[0]
+
+    @property
+    def search(self) -> CrestSearch | None:
+        """The search for the phases of the first signal."""
+        return self.searches[0] if self.searches else None
 
 
 def read_design(data: dict[str, Any], where: str = "design") -> ExcitationDesign:
@@ -174,58 +213,53 @@ def excite(design: ExcitationDesign, robot: Robot | None = None) -> Excited:
             "realizations: expected 1, or a multisine with optimized or random phases, got "
             f"{design.realizations} of {design.signal.kind}, phases {design.signal.phases}"
         )
-    signals = [_signal(design.signal, robot.sample_time_s, design.signal.seed)]
-    for part, seed in _further_phases(design.signal, signals[0][0], design.realizations):
-        signals.append(_signal(part, robot.sample_time_s, seed))
-    sets = [
-        _experiments(design, robot, signal, realization)
-        for realization, (signal, _) in enumerate(signals)
-    ]
+    signals, searches, optimal = _signals(design, robot)
+    sets = [_experiments(design, robot, signals)]
+    for m, further in _further_phases(design, signals):
+        sets.append(_experiments(further, robot, _signals(further, robot, m)[0]))
     made = replace(sets[0], period=np.concatenate([part.period for part in sets]))
     made.design["excite"] = design.model_dump(by_alias=True, mode="json")
     if len(sets) > 1:
         made.design["broadband_of_realizations"] = [part.design["broadband"] for part in sets]
-    signal, search = signals[0]
-    return Excited(made, signal, search, _report(design, made, robot))
+    return Excited(made, signals, searches, _report(design, made, robot), optimal)
 
 
 def _further_phases(
-    design: SignalDesign, first: Multisine | PeriodicSignal, realizations: int
-) -> list[tuple[SignalDesign, int]]:
-    """Return the signals after the first, and the seeds of their phases; all have the lines of the first.
+    design: ExcitationDesign, first: Signals
+) -> Iterator[tuple[int, ExcitationDesign]]:
+    """Yield the number and the design of each realization after the first; all have the lines of the first.
 
-    Random phases take the next run, optimized ones the next seed, since a search uses several runs.
+    Random phases take the next run.
     """
-    same = {"lines": first.lines.tolist(), "band_hz": None, "grid": "full"}
-    return [
-        (design.model_copy(update={**same, "run": design.run + m}), design.seed + m)
-        for m in range(1, realizations)
-    ]
+    lines = sorted({int(line) for signal in first for line in signal.lines})
+    for m in range(1, design.realizations):
+        changes = {"lines": lines, "band_hz": None, "grid": "full", "run": design.signal.run + m}
+        yield m, design.model_copy(update={"signal": design.signal.model_copy(update=changes)})
 
 
-def _experiments(
-    design: ExcitationDesign,
-    robot: Robot,
-    signal: Multisine | PeriodicSignal,
-    realization: int,
-) -> References:
+def _experiments(design: ExcitationDesign, robot: Robot, signals: Signals) -> References:
     """Return the references of one realization."""
     wave = design.square
-    return references(
-        signal,
-        robot.n_axes,
-        directions=design.directions,
-        square=None
-        if wave is None
-        else square(
+    added = None
+    if wave is not None:
+        added = square(
             wave.period_s,
             robot.sample_time_s,
             amplitude=wave.amplitude_rad_s,
             smoothing_samples=wave.smoothing_samples,
-        ),
+        )
+    if design.directions == ZIPPERED:
+        return simultaneous_references(
+            cast(tuple[Multisine, ...], signals), square=added, dc_level=design.dc_level_rad_s
+        )
+    return references(
+        signals[0],
+        robot.n_axes,
+        directions=design.directions,
+        square=added,
         dc_level=design.dc_level_rad_s,
         seed=design.signal.seed,
-        run=design.signal.run + realization,
+        run=design.signal.run,
     )
 
 
@@ -244,44 +278,99 @@ def _report(design: ExcitationDesign, made: References, robot: Robot) -> LimitRe
     )
 
 
-def _signal(
-    s: SignalDesign, sample_time_s: float, seed_of_phases: int
-) -> tuple[Multisine | PeriodicSignal, CrestSearch | None]:
-    if s.kind == "multisine":
-        made, search = _multisine(s, sample_time_s, seed_of_phases)
-        return made.scaled(peak=s.peak_rad_s), search
+def _signals(
+    design: ExcitationDesign, robot: Robot, realization: int = 0
+) -> tuple[Signals, tuple[CrestSearch, ...], OptimalSpectrum | None]:
+    """Return the signals at their peak, the searches for their phases, and the optimal spectrum.
+
+    Optimized phases take the next seed in each realization, since a search uses several runs.
+    """
+    s, zipped = design.signal, design.directions == ZIPPERED
+    if s.kind != "multisine":
+        if zipped or design.optimal is not None:
+            field = "directions" if zipped else "optimal"
+            raise InputError(f"{field}: expected the signal kind multisine, got {s.kind}")
+        return (_other(s, robot.sample_time_s),), (), None
+    if zipped and design.optimal is not None:
+        raise InputError(
+            "optimal, directions: expected at most one of an optimal spectrum and zippered: between "
+            "few strong lines no response can be interpolated"
+        )
+    if zipped and s.snow_lines:
+        raise InputError(
+            "signal.snow_lines: expected none with zippered, where lines belong to axes"
+        )
+    made, optimal = _multisine(s, robot.sample_time_s), None
+    if design.optimal is not None:
+        optimal = _optimal(design, robot, made.scaled(peak=s.peak_rad_s))
+        made = optimal.signal
+    parts = zippered(made, robot.n_axes) if zipped else (made,)
+    if s.phases == "schroeder":
+        parts = tuple(replace(x, phase_rad=schroeder_phases(x.amplitude)) for x in parts)
+    searches: tuple[CrestSearch, ...] = ()
+    if s.phases == "optimized":
+        searches = tuple(
+            optimize_crest_factor(
+                part,
+                starts=s.starts,
+                time_s=s.time_s,
+                seed=s.seed + realization,
+                snow_lines=s.snow_lines,
+            )
+            for part in parts
+        )
+        parts = tuple(found.signal for found in searches)
+    return tuple(part.scaled(peak=s.peak_rad_s) for part in parts), searches, optimal
+
+
+def _optimal(design: ExcitationDesign, robot: Robot, flat: Multisine) -> OptimalSpectrum:
+    wanted = design.optimal or OptimalDesign()
+    directions = design.directions
+    return optimal_spectrum(
+        robot,
+        flat,
+        wanted.optimal_for,
+        parameters=wanted.parameters,
+        # Orthogonal experiments of equal amplitude bring the information of one input at a time.
+        directions="t1" if isinstance(directions, str) and directions == "dft" else directions,
+        limited=wanted.limited,
+        noise_std_rad=wanted.noise_std_rad,
+        flat_share=wanted.flat_share,
+        relative_uncertainty=wanted.relative_uncertainty,
+        models=wanted.models,
+        seed=design.signal.seed,
+    )
+
+
+def _other(s: SignalDesign, sample_time_s: float) -> PeriodicSignal:
+    """Return a signal that is no multisine, at its peak."""
     if s.kind == "prbs":
-        return prbs(sample_time_s, bits=s.bits, amplitude=s.peak_rad_s, hold=s.hold), None
+        return prbs(sample_time_s, bits=s.bits, amplitude=s.peak_rad_s, hold=s.hold)
     period = _given("period_s", s.period_s)
     if s.kind == "triangle":
-        return triangle(period, sample_time_s, amplitude=s.peak_rad_s), None
+        return triangle(period, sample_time_s, amplitude=s.peak_rad_s)
     band = _given("band_hz", s.band_hz)
     if s.kind == "chirp":
-        return chirp(period, sample_time_s, band_hz=band, amplitude=s.peak_rad_s), None
+        return chirp(period, sample_time_s, band_hz=band, amplitude=s.peak_rad_s)
     lines = multisine(period, sample_time_s, band_hz=band, grid=s.grid, seed=s.seed).lines
     if s.kind == "stepped_sine":
         frequencies = lines / period
         return stepped_sine(
             period, sample_time_s, frequency_hz=frequencies, amplitude=s.peak_rad_s
-        ).signal, None
-    return (
-        discrete_interval_binary(
-            period,
-            sample_time_s,
-            lines=lines,
-            amplitude=s.peak_rad_s,
-            hold=s.hold,
-            starts=s.starts,
-            seed=s.seed,
-        ),
-        None,
+        ).signal
+    return discrete_interval_binary(
+        period,
+        sample_time_s,
+        lines=lines,
+        amplitude=s.peak_rad_s,
+        hold=s.hold,
+        starts=s.starts,
+        seed=s.seed,
     )
 
 
-def _multisine(
-    s: SignalDesign, sample_time_s: float, seed_of_phases: int
-) -> tuple[Multisine, CrestSearch | None]:
-    made = multisine(
+def _multisine(s: SignalDesign, sample_time_s: float) -> Multisine:
+    return multisine(
         _given("period_s", s.period_s),
         sample_time_s,
         band_hz=s.band_hz,
@@ -292,12 +381,6 @@ def _multisine(
         run=s.run,
         group=s.group,
     )
-    if s.phases != "optimized":
-        return made, None
-    search = optimize_crest_factor(
-        made, starts=s.starts, time_s=s.time_s, seed=seed_of_phases, snow_lines=s.snow_lines
-    )
-    return search.signal, search
 
 
 def _given(field: str, value: T | None) -> T:

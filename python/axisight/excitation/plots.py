@@ -9,6 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from axisight.arguments import Lines, Real, instance
 from axisight.excitation.multisine import Multisine
+from axisight.excitation.optimal import OptimalSpectrum
 from axisight.excitation.references import References
 from axisight.excitation.signals import PeriodicSignal
 from axisight.palette import AFTER, BEFORE, MEASURED, SERIES
@@ -56,6 +57,37 @@ def plot_references(references: References) -> Figure:
     for axes in grid[-1]:
         axes.set_xlabel("time [s]", fontsize=8)
     _dress(list(grid.flat))
+    return figure
+
+
+def plot_optimal_spectrum(found: OptimalSpectrum) -> Figure:
+    """Plot where an optimal spectrum puts the power, against the flat one, and return a Figure.
+
+    Above: share of the limited power of every line, logarithmic. Below: the dispersion of the
+    equivalence theorem, which reaches one where the optimum puts power; empty for responses, which have
+    a closed form. Raises InputError for anything but an optimal spectrum.
+    """
+    instance("found", found, OptimalSpectrum)
+    figure = Figure(figsize=(7.2, 4.4), layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    frequency = found.lines / found.signal.period_s
+    for shares, color, name in (
+        (found.flat_shares, BEFORE, "flat"),
+        (found.shares, AFTER, "optimal"),
+    ):
+        shown = shares > 0
+        above.semilogy(
+            frequency[shown], shares[shown], color=color, lw=0.8, marker="o", ms=2, label=name
+        )
+    above.set_ylabel("share of the power", fontsize=8)
+    above.legend(fontsize=7, frameon=False, loc="upper right")
+    above.set_title(f"{found.criterion}, gain {found.gain:.3g}", fontsize=8, pad=2)
+    below.plot(frequency, found.dispersion, color=AFTER, lw=0.8)
+    below.axhline(1.0, color=MEASURED, lw=0.8, ls="--")
+    below.set_ylabel("dispersion", fontsize=8)
+    below.set_ylim(0, 1.1)
+    below.set_xlabel("frequency [Hz]", fontsize=8)
+    _dress([above, below])
     return figure
 
 

@@ -141,7 +141,7 @@ def references(
         chosen = directions if isinstance(directions, str) else matrix.tolist()
     if square is not None:
         instance("square", square, PeriodicSignal)
-        period = period + _repeated(square, broadband)[None, :, None]
+        period = period + repeated(square, broadband)[None, :, None]
     level = per_item("dc_level", dc_level, n)
     detection = getattr(broadband, "detection_lines", np.empty(0, np.int64))
     return References(
@@ -174,7 +174,8 @@ def describe(signal: Multisine | PeriodicSignal) -> dict[str, Any]:
     return {"kind": "multisine", **common, **arrays}
 
 
-def _repeated(square: PeriodicSignal, broadband: Multisine | PeriodicSignal) -> Real:
+def repeated(square: PeriodicSignal, broadband: Multisine | PeriodicSignal) -> Real:
+    """Return as many periods of ``square`` as one of ``broadband`` holds; raises InputError if not whole."""
     count, rest = divmod(broadband.n_samples, square.n_samples)
     if rest or abs(square.sample_time_s / broadband.sample_time_s - 1) > 1e-9:
         raise InputError(

@@ -9,7 +9,9 @@ from axisight.frf.explain import explain_flags
 from axisight.frf.fast import FastMethod, fast_method
 from axisight.frf.h1 import h1, h2
 from axisight.frf.harmonic_mean import harmonic_mean
+from axisight.frf.input_covariance import with_input_covariance
 from axisight.frf.joint_input_output import joint_input_output
+from axisight.frf.local_joint_input_output import local_joint_input_output
 from axisight.frf.local_polynomial import local_polynomial
 from axisight.frf.local_rational import local_rational
 from axisight.frf.logarithmic_mean import logarithmic_mean
@@ -39,6 +41,7 @@ __all__ = [
     "harmonic_mean",
     "invert",
     "joint_input_output",
+    "local_joint_input_output",
     "local_polynomial",
     "local_rational",
     "logarithmic_mean",
@@ -49,4 +52,5 @@ __all__ = [
     "robust_method",
     "smooth",
     "spectral_analysis",
+    "with_input_covariance",
 ]

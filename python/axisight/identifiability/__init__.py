@@ -11,6 +11,7 @@ of Axisight, and `of_matrix` from any information matrix.
 
 from axisight.identifiability.assessment import Combination, Identifiability, identifiability
 from axisight.identifiability.comparison import compare_experiments, recommend_experiments
+from axisight.identifiability.effort import OptimalEffort, optimal_effort
 from axisight.identifiability.information import Information, information, of_matrix
 from axisight.identifiability.sources import (
     of_covariance,
@@ -24,6 +25,7 @@ __all__ = [
     "Combination",
     "Identifiability",
     "Information",
+    "OptimalEffort",
     "compare_experiments",
     "identifiability",
     "information",
@@ -33,5 +35,6 @@ __all__ = [
     "of_matrix",
     "of_regressor",
     "of_simulation",
+    "optimal_effort",
     "recommend_experiments",
 ]

@@ -11,7 +11,7 @@ from axisight import load_robot
 from axisight.cli import app
 from axisight.effects import Effect
 from axisight.errors import InputError
-from axisight.excitation.plots import plot_references, plot_signal
+from axisight.excitation.plots import plot_optimal_spectrum, plot_references, plot_signal
 
 ROBOT = load_robot("irb6600_like")
 STEP = ROBOT.sample_time_s
@@ -140,3 +140,17 @@ def test_snow_and_response_say_why_not() -> None:
     signal = ex.multisine(0.5, STEP, lines=[1, 3])
     with pytest.raises(InputError, match="the response is known at the excited lines only"):
         ex.optimize_crest_factor(signal, snow_lines=[5], response=[1.0, 2.0])
+
+
+def test_optimal_spectrum_is_drawn_against_the_flat_one() -> None:
+    robot = load_robot("two_mass_axis")
+    flat = ex.multisine(2.0, robot.sample_time_s, band_hz=(1.0, 30.0)).scaled(rms=1.0)
+    found = ex.optimal_spectrum(robot, flat, "axis1.stiffness")
+    above, below = plot_optimal_spectrum(found).axes
+    before, after = (line.get_ydata() for line in above.lines)
+    assert np.sum(before) == pytest.approx(1.0)
+    assert np.sum(after) == pytest.approx(1.0)
+    assert np.max(after) > 3 * np.max(before)
+    assert np.max(below.lines[0].get_ydata()) < 1.01
+    with pytest.raises(InputError, match="found"):
+        plot_optimal_spectrum(flat)  # type: ignore[arg-type]
