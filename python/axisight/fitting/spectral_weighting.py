@@ -28,7 +28,7 @@ def spectral_weighting(
 
     The weight is one over the root of the spectrum. Periodograms of all logs are averaged over bands that
     are equally wide on a logarithmic scale. A prediction-error fit with a noise model weights its residuals
-    in this way (Wernholt 2004, section 3.3.2); the spectrum serves as the noise model. An axis without
+    in this way (Wernholt 2004, section 3.4.2); the spectrum serves as the noise model. An axis without
     residuals gets the weight zero.
 
     residuals

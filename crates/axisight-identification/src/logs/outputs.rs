@@ -87,9 +87,9 @@ impl SimulationErrorProblem {
         let column = measured.iter().skip(first + axis).step_by(n_axes);
         if is_joint && (measured.is_empty() || column.clone().any(|y| y.is_nan())) {
             // This axis has no joint encoder.
-            traces
-                .iter_mut()
-                .for_each(|quantity| quantity[slot].fill(0.0));
+            for quantity in traces {
+                quantity[slot].fill(0.0);
+            }
             return;
         }
         let missing = std::iter::repeat(&0.0);
@@ -99,9 +99,9 @@ impl SimulationErrorProblem {
             .for_each(|(y, measured)| *y -= measured);
         if is_joint {
             let samples = measured[first..].len() / n_axes;
-            traces
-                .iter_mut()
-                .for_each(|quantity| centre(&mut quantity[slot], samples));
+            for quantity in traces {
+                centre(&mut quantity[slot], samples);
+            }
         }
     }
 
@@ -132,5 +132,7 @@ impl SimulationErrorProblem {
 fn centre(series: &mut [f64], samples: usize) {
     let own = &series[..samples.min(series.len())];
     let mean = own.iter().sum::<f64>() / own.len().max(1) as f64;
-    series.iter_mut().for_each(|x| *x -= mean);
+    for x in series {
+        *x -= mean;
+    }
 }

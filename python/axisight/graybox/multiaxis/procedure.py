@@ -1,6 +1,6 @@
 """The three steps of chapter 9 for all axes of an arm together.
 
-Wernholt (2004), section 9.3 for one axis; chapter 10 proposes it for several.
+Wernholt (2004), section 9.3 for one axis; section 9.6 proposes it for several.
 """
 
 from __future__ import annotations
