@@ -18,6 +18,9 @@ from axisight.statistics.least_squares import inverse_root
 LAGS = 20
 """Largest distance in samples at which errors of different models count as correlated."""
 
+_Part = tuple[list[Real], list[Real]]
+"""Influences (parameters, n, p) and errors (n, p) of one model, by experiment."""
+
 
 def joint_covariance(
     models: Sequence[InnovationsModel], experiments: Sequence[Sequence[Experiment]]
@@ -29,29 +32,40 @@ def joint_covariance(
     tapered (Newey and West, 1987). As in `InnovationsModel.covariance`, nothing is said about changes
     of coordinates. NaN if the data do not determine a model.
     """
-    total = sum(len(m.covariance) for m in models)
     each = [_influence(m, data) for m, data in zip(models, experiments, strict=True)]
     if any(part is None for part in each):
+        total = sum(len(m.covariance) for m in models)
         return np.full((total, total), np.nan)
     parts = [part for part in each if part is not None]
-    errors = [np.hstack([e[k] for _, e in parts]) for k in range(len(experiments[0]))]
-    influences = [_beside([m[k] for m, _ in parts]) for k in range(len(experiments[0]))]
-    n = sum(map(len, errors))
-    out = np.zeros((total, total))
-    for lag in range(LAGS + 1):
-        late = [(e[: len(e) - lag], e[lag:]) for e in errors]
-        power = sum((a.T @ b for a, b in late), np.zeros((errors[0].shape[1],) * 2)) / n
-        taper = 1 - lag / (LAGS + 1)
-        for m in influences:
-            seen = (m[:, : m.shape[1] - lag] @ power).reshape(total, -1)
-            part = taper * seen @ m[:, lag:].reshape(total, -1).T
-            out += part if lag == 0 else part + part.T
+    upper = {
+        (i, j): _between(one, other)
+        for i, one in enumerate(parts)
+        for j, other in enumerate(parts)
+        if i <= j
+    }
+    places = range(len(parts))
+    out = np.block([[upper[i, j] if i <= j else upper[j, i].T for j in places] for i in places])
+    return np.asarray((out + out.T) / 2)
+
+
+def _between(one: _Part, other: _Part) -> Real:
+    """Return the covariance of the parameters of two models."""
+    n = sum(map(len, one[1]))
+    out = np.zeros((len(one[0][0]), len(other[0][0])))
+    for lag in range(-LAGS, LAGS + 1):
+        # Errors of the first model at t, of the second at t + lag.
+        early, late = (slice(max(-lag, 0), -lag if lag > 0 else None) for lag in (lag, -lag))
+        pairs = zip(one[1], other[1], strict=True)
+        size = (one[1][0].shape[1], other[1][0].shape[1])
+        power = sum((a[early].T @ b[late] for a, b in pairs), np.zeros(size)) / n
+        taper = 1 - abs(lag) / (LAGS + 1)
+        for m, k in zip(one[0], other[0], strict=True):
+            seen = (m[:, early] @ power).reshape(len(m), -1)
+            out += taper * seen @ k[:, late].reshape(len(k), -1).T
     return out
 
 
-def _influence(
-    model: InnovationsModel, experiments: Sequence[Experiment]
-) -> tuple[list[Real], list[Real]] | None:
+def _influence(model: InnovationsModel, experiments: Sequence[Experiment]) -> _Part | None:
     """Return influences (parameters, n, p) and errors (n, p) by experiment."""
     problem, x = problem_of(model, experiments), matrices_of(model)
     ways = problem.layout.directions(x)
@@ -63,14 +77,3 @@ def _influence(
     found = (-ways @ root @ root.T @ slope.T).reshape(len(ways), -1, p) @ problem.weight
     ends = np.cumsum([e.n_samples for e in experiments])[:-1]
     return np.split(found, ends, axis=1), problem.errors(x)
-
-
-def _beside(parts: list[Real]) -> Real:
-    """Return influences of all parameters on all errors, (parameters, n, errors)."""
-    rows, columns = (sum(m.shape[axis] for m in parts) for axis in (0, 2))
-    out = np.zeros((rows, parts[0].shape[1], columns))
-    row = column = 0
-    for m in parts:
-        out[row : row + m.shape[0], :, column : column + m.shape[2]] = m
-        row, column = row + m.shape[0], column + m.shape[2]
-    return out
