@@ -1,6 +1,6 @@
 //! Viscous friction that changes while the gear warms up.
 
-use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Motor, ParameterInfo, Prior, Role};
+use super::{Acts, EffectInfo, Experiment, Family, Formula, Kernel, Motor, ParameterInfo, Plainer, Prior, Role, Shown};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {
@@ -14,6 +14,12 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     shown_by: &[Experiment::Speeds],
     formula: Formula::FRICTION,
     beside: &["viscous_friction"],
+    plainer: Some(Plainer {
+        law: "viscous_friction",
+        adds: &["viscous_nm_s_rad"],
+        likelier: 10.0,
+        shown: Shown::Sizes,
+    }),
     parameters: &[
         ParameterInfo {
             name: "viscous_nm_s_rad",
