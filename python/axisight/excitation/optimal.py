@@ -38,6 +38,7 @@ ALL = "all"
 RESPONSES = ("relative_response", "absolute_response")
 USUAL = ("*.stiffness", "*.damping")
 
+MOST_MODELS = 1000
 Parameters = Sequence[str | Parameter] | Mapping[str, float]
 Criterion = Literal["determinant", "variance", "relative_response", "absolute_response"]
 
@@ -158,7 +159,7 @@ def optimal_spectrum(
     one_of("limited", limited, _LIMITED)
     linear, left_out = _linear_part(robot)
     usual = [n for n in robot.parameters() if any(fnmatchcase(n, p) for p in USUAL)]
-    chosen = usual if parameters is None else parameters
+    chosen = usual if parameters is None else _named(parameters)
 
     def lines_of(values: Parameters) -> LineInformation:
         return line_information(
@@ -282,6 +283,17 @@ def _linear_part(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
     return (robot.with_effects(kept) if others else robot), others
 
 
+def _named(parameters: object) -> Parameters:
+    """Return the parameters; raises InputError unless they are a list or a dict of names."""
+    what = "a list of names or Parameter, or a dict of names and starts"
+    names = (
+        list(parameters) if isinstance(parameters, Mapping) else several("parameters", parameters)
+    )
+    if not all(isinstance(name, str | Parameter) for name in names):
+        raise InputError(f"parameters: expected {what}, got {shown(parameters)}")
+    return parameters if isinstance(parameters, Mapping) else names
+
+
 def _prior(measured_information: ArrayLike | None, names: tuple[str, ...]) -> Real:
     n = len(names)
     if measured_information is None:
@@ -327,9 +339,11 @@ def _scattered(
     seed: int,
 ) -> list[dict[str, float]]:
     """Return starts of the parameters that scatter about the model, a function of the seed."""
-    chosen, count = specs(robot, parameters), whole("models", models)
+    chosen, count = specs(robot, parameters), whole("models", models, 1, MOST_MODELS)
     rng = np.random.default_rng([seed_of("seed", seed), count])
-    if not not_negative("relative_uncertainty", relative_std):
+    if not_negative("relative_uncertainty", relative_std) > 1:
+        raise InputError(f"relative_uncertainty: expected 0 to 1, got {relative_std:g}")
+    if relative_std == 0:
         return []
     draws = rng.standard_normal((count, len(chosen)))
     spread = np.log1p(relative_std)

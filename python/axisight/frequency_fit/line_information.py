@@ -26,6 +26,9 @@ Complex = NDArray[np.complex128]
 Power = Literal["torque", "velocity", "reference"]
 UNITS: dict[Power, str] = {"torque": "Nm", "velocity": "rad/s", "reference": "rad/s"}
 
+SMALLEST_NOISE_RAD, LARGEST_NOISE_RAD = 1e-30, 1e30
+"""Squares of such noise stay far from overflow."""
+
 
 @summarized
 @dataclass(frozen=True, eq=False)
@@ -142,8 +145,11 @@ def _noise_power(
         std = np.broadcast_to(std, shape)
     except ValueError:
         raise InputError(f"noise_std_rad: expected shape {shape}, got {std.shape}") from None
-    if not (std > 0).all():
-        raise InputError("noise_std_rad: expected positive numbers, got others")
+    if not ((std >= SMALLEST_NOISE_RAD) & (std <= LARGEST_NOISE_RAD)).all():
+        raise InputError(
+            f"noise_std_rad: expected {SMALLEST_NOISE_RAD:g} to {LARGEST_NOISE_RAD:g} rad, got "
+            f"{std.min():g} to {std.max():g}"
+        )
     return np.asarray(n_samples * std**2 / n_periods)
 
 

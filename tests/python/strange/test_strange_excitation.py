@@ -13,6 +13,8 @@ SINES = ex.multisine(0.1, T, lines=LINES, phases="schroeder")
 WAVE = ex.triangle(0.1, T)
 ROBOT = load_robot("irb6600_like")
 SMALL = ex.references(ex.multisine(0.01, ROBOT.sample_time_s, lines=[1]), 3)
+AXIS = load_robot("two_mass_axis")
+FLAT = ex.multisine(1.0, AXIS.sample_time_s, lines=range(2, 20))
 DESIGN = {
     "robot": "irb6600_like",
     "signal": {"period_s": 0.1, "band_hz": (20.0, 60.0), "peak_rad_s": 1.0, "phases": "random"},
@@ -151,6 +153,33 @@ CASES = {
             "unit": "rad/s",
         },
     ),
+    "zippered": (ex.zippered, {"signal": SINES, "n_inputs": 2}),
+    "simultaneous_references": (
+        ex.simultaneous_references,
+        {"signals": [SINES, SINES], "square": WAVE, "dc_level": 0.0, "unit": "rad/s"},
+    ),
+    "optimal_spectrum": (
+        lambda **a: ex.optimal_spectrum(**a).signal,
+        {
+            "robot": AXIS,
+            "flat": FLAT,
+            "optimal_for": "axis1.stiffness",
+            "parameters": ["axis1.stiffness", "axis1.damping"],
+            "directions": "t1",
+            "limited": "both",
+            "n_periods": 1,
+            "noise_std_rad": 1e-5,
+            "operating_points_rad": [[0.0]],
+            "flat_share": 0.1,
+            "relative_uncertainty": 0.1,
+            "models": 2,
+            "seed": 0,
+            "measured_information": np.zeros((2, 2)),
+            "least_share": 1e-4,
+            "tolerance": 1e-2,
+            "max_iterations": 100,
+        },
+    ),
     "References": (
         ex.References,
         {
@@ -187,7 +216,7 @@ CASES = {
 }
 # Repeating for 0.5 or 2^70 periods is refused; a plot of the design is looked at elsewhere.
 OTHERS = {"Clipping", "CrestSearch", "Excess", "ExcitationDesign", "Excited", "LimitReport"}
-OTHERS |= {"LpRefinement", "SteppedSine"}
+OTHERS |= {"LpRefinement", "OptimalSpectrum", "SteppedSine"}
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -19,6 +19,7 @@ ONE = replace(RECORDS, input=RECORDS.input[..., :1], output=RECORDS.output[..., 
 SET = loop_records(1, 2, n_samples=40, noise=1e-3, lines=np.array([1, 3, 5, 7, 11, 13]))[0]
 ROWS = np.random.default_rng(1).normal(size=(2, 80, 1))
 ARBITRARY = ArbitraryRecords(1e-3, ROWS, np.roll(ROWS, 1, axis=1))
+DENSE = loop_records(1, 2, n_samples=80, noise=1e-3, lines=np.arange(1, 30))[0]
 ESTIMATE = frf.mfrf(RECORDS)
 OPTIONS = {"quantity": "velocity", "remove_drift": True, "threads": 1}
 G = np.array([[[1.0, 0.2], [0.1, 2.0]]] * 3) * (1 + 0.5j)
@@ -53,6 +54,22 @@ CASES = {
     "local_rational": (
         frf.local_rational,
         {"records": ARBITRARY, "denominator_order": 1, **LOCAL},
+    ),
+    "local_joint_input_output": (
+        frf.local_joint_input_output,
+        {
+            "records": DENSE,
+            "order": 1,
+            "denominator_order": 1,
+            "half_width": None,
+            "lines": None,
+            "quantity": "velocity",
+            "remove_drift": True,
+        },
+    ),
+    "with_input_covariance": (
+        frf.with_input_covariance,
+        {"dataset": ESTIMATE, "records": RECORDS, "half_width": 1},
     ),
     "smooth": (
         frf.smooth,
