@@ -184,8 +184,8 @@ def optimal_spectrum(
     if criterion in RESPONSES:
         return problem.result(problem.response_variance, left_out)
     drawn = _scattered(robot, chosen, relative_uncertainty, models, seed)
-    informations = [lines_of(values).information for values in drawn]
-    every = np.array(informations or [problem.nominal.information])
+    each = [lines_of(values).information for values in drawn]
+    every = np.array(each or [problem.nominal.information])
     before = flat.amplitude**2
     found = optimal_effort(
         (1 - share) * every,
