@@ -132,6 +132,11 @@ def runs() -> dict[str, Callable[[], Run]]:
             model, limits, fundamental_hz=0.1, starts=1, max_iterations=30
         )
 
+    def optimal() -> Run:
+        robot = axisight.load_robot("irb6600_like")
+        flat = excitation.multisine(10.0, robot.sample_time_s, band_hz=(1, 40)).scaled(rms=4.0)
+        return lambda: excitation.optimal_spectrum(robot, flat, "axis1.stiffness")
+
     def planned() -> Run:
         robot = axisight.load_robot("irb6600_like")
         names = [f"axis{i}.stiffness" for i in (1, 2, 3)]
@@ -147,6 +152,8 @@ def runs() -> dict[str, Callable[[], Run]]:
         "ARX": black_box(blackbox.arx, na=4, nb=4),
         "output error": black_box(blackbox.output_error, nf=2, nb=3),
         "orders of ARX": black_box(blackbox.arx_orders, na=range(1, 9), nb=range(1, 9)),
+        "ARMAX": black_box(blackbox.armax, na=4, nb=4, nc=2),
+        "state space by prediction errors": black_box(blackbox.state_space_pem, order=8),
         "vector fitting": rational,
         "local polynomial": local(frf.local_polynomial),
         "local rational": local(frf.local_rational),
@@ -156,6 +163,7 @@ def runs() -> dict[str, Callable[[], Run]]:
         "consistent bodies": consistent,
         "chain of masses": chain,
         "identifiability": planned,
+        "optimal spectrum": optimal,
     }
 
 

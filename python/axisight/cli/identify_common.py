@@ -113,6 +113,8 @@ def _checked(
         ):
             continue
         text = f"{path.name}: {finding.column}: {finding.message}"
+        if finding.severity == "error" and finding.column == "file":
+            raise InputError(finding.message)  # no column map would mend it
         if finding.severity == "error" and not finding.name and not unchecked:
             raise InputError(f"{text} (correct it in a column map, or go on with --unchecked)")
         if finding.severity == "warning" or (finding.severity == "error" and not finding.name):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
@@ -24,7 +25,8 @@ def plan_command(
     waypoints: Annotated[
         Path,
         typer.Argument(
-            help="CSV, one point a row: positions of the joints (rad), or x,y,z (m) with --tool."
+            help="CSV, one point a row: positions of the joints (rad), or x,y,z (m) with --tool. A first row may "
+            "name the joints."
         ),
     ],
     velocity_limit: Annotated[
@@ -88,7 +90,7 @@ def plan_command(
             one_or_each("--torque-limit", torque_limit),
         )
         machine = ModelOptions(base, tip, payload).load(robot)
-        points = _rows(waypoints)
+        points = _rows(waypoints, ["x", "y", "z"] if tool else machine.axis_names)
         if tool is None:
             path = joint_path(machine, points)
         else:
@@ -111,26 +113,39 @@ def plan_command(
             say(f"written: {written}")
 
 
-def _rows(path: Path) -> list[list[float]]:
-    """Return the numbers of a CSV file by row; a first row without any number is a header."""
+def _rows(path: Path, names: list[str]) -> list[list[float]]:
+    """Return the numbers of a CSV file by row, in the order of ``names``.
+
+    A first row of names may say another order; without it, the columns are in this order.
+    """
     try:
         lines = read_text(usable_path(path, InputError)).splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: expected a CSV file of numbers: {error}") from None
+    cells = [(k, [x.strip() for x in line.split(",")]) for k, line in enumerate(lines, 1)]
+    cells = [(k, row) for k, row in cells if any(row)]
+    order = list(range(len(names)))
+    if cells and not any(map(_is_number, cells[0][1])):
+        header = cells.pop(0)[1]
+        if sorted(header) != sorted(names):
+            raise InputError(
+                f"{path}: expected the columns {', '.join(names)}, got {short(', '.join(header))}"
+            )
+        order = [header.index(name) for name in names]
     rows: list[list[float]] = []
-    for number, line in enumerate(lines, 1):
-        if not line.strip():
-            continue
-        try:
-            rows.append([float(cell) for cell in line.split(",")])
-        except ValueError:
-            if number > 1:
-                raise InputError(
-                    f"{path}: line {number}: expected numbers between commas, got {short(line)}"
-                ) from None
-    if len({len(row) for row in rows}) != 1:
-        lengths = ", ".join(str(len(row)) for row in rows) or "none"
-        raise InputError(
-            f"{path}: expected rows of one length, got rows of {short(lengths)} numbers"
-        )
+    for k, row in cells:
+        if len(row) != len(names) or not all(map(_is_number, row)):
+            raise InputError(
+                f"{path}: line {k}: expected {len(names)} numbers ({', '.join(names)}), got {short(','.join(row))}"
+            )
+        rows.append([float(row[i]) for i in order])
+    if not rows:
+        raise InputError(f"{path}: expected rows of numbers, got none")
     return rows
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return isfinite(float(cell))
+    except ValueError:
+        return False

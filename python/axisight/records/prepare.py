@@ -318,8 +318,8 @@ def _excited(cut: list[Signals], lines: Lines | None, findings: list[RecordFindi
         found = excited_lines(signal, floor_db=floor)
     unsure = found.margin_db < _CLEAR_MARGIN_DB
     message = (
-        f"{len(found.lines)} excited lines, {found.lines[0]} to {found.lines[-1]}, found from the "
-        f"{source}; the weakest is {found.margin_db:.1f} dB over the strongest other line"
+        f"{len(found.lines)} excited lines, {found.lines[0]} to {found.lines[-1]} times one over the period, "
+        f"found from the {source}; the weakest is {found.margin_db:.1f} dB over the strongest other line"
         + ("; give lines" if unsure else "")
     )
     findings.append(

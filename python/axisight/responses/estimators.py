@@ -25,11 +25,15 @@ Estimator = Literal[
     "fast",
     "local_polynomial",
     "local_rational",
+    "local_joint_input_output",
     "spectral",
 ]
 Mean = Literal["arithmetic", "logarithmic", "harmonic", "none"]
 ESTIMATORS: tuple[str, ...] = get_args(Estimator)
 MEANS: tuple[str, ...] = get_args(Mean)
+
+FROM_REFERENCES = ("joint_input_output", "local_joint_input_output")
+"""Estimators that need the references."""
 
 _LOCAL = ("local_polynomial", "local_rational")
 _OF_ANY = ("auto", *_LOCAL, "spectral")
@@ -47,6 +51,7 @@ _PERIODIC: dict[str, Callable[..., xr.Dataset]] = {
     "h1": frf.h1,
     "h2": frf.h2,
     "joint_input_output": frf.joint_input_output,
+    "local_joint_input_output": frf.local_joint_input_output,
     "robust": frf.robust_method,
 }
 
@@ -85,7 +90,8 @@ def chosen_of_periodic(
         return Choice(estimator, "none")
     if total < n:
         return Choice(
-            "local_rational",
+            # From the references there is no bias by noise in the loop.
+            "local_rational" if records.reference is None else "local_joint_input_output",
             "none",
             f"{counted(total, 'experiment')} for {n} axes: neighbouring lines have to tell the axes apart",
         )
@@ -156,6 +162,8 @@ def estimate_periodic(
         if not few:
             return _local(name)(records, **options)
         return _by_neighbours(records, name, options)
+    if name == "local_joint_input_output":
+        _expect_told_apart(records, _told_apart(records))
     return _PERIODIC[name](records, **options)
 
 
@@ -169,16 +177,44 @@ def _by_neighbours(records: PeriodicRecords, name: str, options: dict[str, Any])
         output_unit=records.output_unit,
     )
     found = _local(name)(mean, lines=records.lines, **options)
-    lost = float(np.mean(~(found["condition"].values < _WORST_CONDITION)))
-    if records.n_experiments < records.n_inputs and lost > 0.5:
-        raise InputError(
-            f"logs: expected at least {counted(records.n_inputs, 'experiment')} for {records.n_inputs} axes, or "
-            f"axes excited at different lines, got {counted(records.n_experiments, 'experiment')} that excite "
-            f"one direction at neighbouring lines; record the missing experiments, or estimate fewer axes"
-        )
+    by_inputs = float(np.mean(found["condition"].values < _WORST_CONDITION))
+    by_references = 1.0 if records.reference is None else _told_apart(records)
+    _expect_told_apart(records, min(by_inputs, by_references))
     return found
 
 
+def _expect_told_apart(records: PeriodicRecords, share: float) -> None:
+    """Raise InputError for fewer experiments than axes that tell the axes apart at too small a share of the lines."""
+    if records.n_experiments < records.n_inputs and share < _TOLD_APART:
+        raise InputError(
+            f"logs: expected at least {counted(records.n_inputs, 'experiment')} for {records.n_inputs} axes, or "
+            f"axes excited at different lines, got {counted(records.n_experiments, 'experiment')} that excite "
+            f"too few directions at neighbouring lines; record the missing experiments, or estimate fewer axes"
+        )
+
+
+def _told_apart(records: PeriodicRecords) -> float:
+    """Return the share of the lines around which the references excite all axes, each in its own way.
+
+    Noise and friction make torques differ from line to line. References tell what the experiments excite.
+    """
+    assert records.reference is not None  # checked before
+    mean = records.reference.mean(axis=1)
+    spectra = np.fft.rfft(mean, axis=1)[:, records.lines]
+    spectra /= np.maximum(np.sqrt((np.abs(spectra) ** 2).mean(axis=(0, 1))), 1e-300)
+    reach = _NEIGHBOURS * records.n_inputs
+    windows = (
+        spectra[:, max(k - reach, 0) : k + reach + 1].reshape(-1, spectra.shape[2])
+        for k in range(spectra.shape[1])
+    )
+    return float(np.mean([np.linalg.cond(x) < _WORST_OF_REFERENCES for x in windows]))
+
+
+# Smallest share of the lines at which fewer experiments than axes have to tell the axes apart.
+_TOLD_APART = 0.5
+# Lines on either side for each axis in which references must differ, and the worst condition number of a window.
+_NEIGHBOURS = 3
+_WORST_OF_REFERENCES = 30.0
 # Beyond, the inputs within a window are the same but for noise.
 _WORST_CONDITION = 1e3
 

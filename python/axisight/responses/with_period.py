@@ -23,7 +23,12 @@ from axisight.records import (
 )
 from axisight.responses.account import Setting
 from axisight.responses.cutting import Cut, said_cuts
-from axisight.responses.estimators import Choice, chosen_of_periodic, estimate_periodic
+from axisight.responses.estimators import (
+    FROM_REFERENCES,
+    Choice,
+    chosen_of_periodic,
+    estimate_periodic,
+)
 from axisight.responses.options import Estimated, Options
 from axisight.responses.ordering import Order, in_order, realizations
 
@@ -61,10 +66,10 @@ def estimate_with_period(
         count=order.count,
         settled=_settled(prepared),
     )
-    if choice.estimator == "joint_input_output" and records.reference is None:
+    if choice.estimator in FROM_REFERENCES and records.reference is None:
         raise InputError(
             "reference: expected velocity references or position targets in the logs for the estimator "
-            "joint_input_output, got none"
+            f"{choice.estimator}, got none"
         )
     findings = prepared.findings
     local = choice.estimator in ("local_polynomial", "local_rational") and records.n_periods > 1

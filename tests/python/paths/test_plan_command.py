@@ -22,11 +22,18 @@ def run(folder, text, *more, code=0):
 
 
 def test_waypoints_become_references(tmp_path):
-    said, out = run(tmp_path, "a,b,c\n0,0,0\n0.4,0.2,-0.2\n")
+    said, out = run(tmp_path, "axis1,axis2,axis3\n0,0,0\n0.4,0.2,-0.2\n")
     made = read_references(out)
     assert "from rest to rest" in said
     assert f"{made.design['duration_s']:.4g} s" in said
     assert np.abs(made.period).max() <= 200
+
+
+def test_a_first_row_of_names_says_the_order(tmp_path):
+    made = []
+    for text in ("axis3,axis1,axis2\n0,0,0\n-0.2,0.4,0.2\n", "0,0,0\n0.4,0.2,-0.2\n"):
+        made.append(read_references(run(tmp_path, text, "--force")[1]).period)
+    assert np.array_equal(*made)
 
 
 def test_a_line_of_the_tool(tmp_path):
@@ -38,9 +45,11 @@ def test_a_line_of_the_tool(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("0,0,0\n1,2\n", "rows of 3, 2 numbers"),
-        ("0,0,0\n1,2,x\n", "line 2: expected numbers"),
-        ("a,b,c\n", "none"),
+        ("0,0,0\n1,2\n", "line 2: expected 3 numbers (axis1, axis2, axis3)"),
+        ("0,0,0\n1,2,x\n", "line 2: expected 3 numbers"),
+        ("0,0,0\n1,2,nan\n", "line 2: expected 3 numbers"),
+        ("a,b,c\n0,0,0\n", "expected the columns axis1, axis2, axis3, got a, b, c"),
+        ("axis1,axis2,axis3\n", "none"),
         ("0,0,0\n", "n >= 2"),
     ],
 )

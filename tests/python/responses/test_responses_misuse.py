@@ -110,3 +110,26 @@ def test_estimators_of_periods_need_one() -> None:
     x = np.random.default_rng(1).standard_normal((2, 1000, 2))
     logs = [log(f"e{e}", x[e], x[e] * 2) for e in range(2)]
     assert "for logs that do not repeat, got mfrf; give period_s" in refused(logs, estimator="mfrf")
+
+
+@pytest.mark.parametrize("square", [False, True])
+def test_two_experiments_of_three_axes_are_refused(square: bool) -> None:
+    """Noise, friction and a square wave make torques differ between lines; the references do not excite all axes."""
+    robot = axisight.load_robot("irb6600_like")
+    friction = [axisight.Effect("coulomb_friction", a, {"coulomb_nm": 0.5}) for a in (1, 2, 3)]
+    tones = excitation.multisine(1.0, robot.sample_time_s, band_hz=(2, 60), seed=3).scaled(peak=8)
+    wave = excitation.square(1.0, robot.sample_time_s, amplitude=20.0) if square else None
+    made = excitation.references(tones, 3, directions="t2", square=wave).repeated(4)[:2]
+    run = axisight.simulate_batch(robot, made, effects=friction, noise_seed=0)
+    logs = [
+        log(
+            f"e{e}",
+            run["torque_cmd_nm"].values[e],
+            run["position_rad"].values[e],
+            made[e],
+            robot.sample_time_s,
+        )
+        for e in range(2)
+    ]
+    with pytest.raises(InputError, match="at least 3 experiments for 3 axes"):
+        response_of_logs(logs, robot=robot)

@@ -20,9 +20,8 @@ def between_steps(elastic: ElasticStep, joint: JointStep, logs: Sequence[str]) -
     out = []
     for name, value, std in zip(joint.fit.names, joint.fit.values, joint.fit.std, strict=True):
         if std > _UNKNOWN * abs(value):
-            share = 100 * std / max(abs(value), 1e-300)
             out.append(
-                f"{name}: the standard error is {share:.0f} % of the value: the logs do not determine it; "
+                f"{name}: {value:.3g} with a standard error of {std:.2g}: the logs do not determine it; "
                 "excite it more, or leave it out"
             )
     if float(np.min(joint.fit_percent)) < POOR_PERCENT:
