@@ -47,6 +47,7 @@ __all__ = [
     "frf_local_periodic",
     "inertial_parameters",
     "invert_matrices",
+    "linear_states",
     "measurement_noise",
     "multisine_peak",
     "multivariable",
@@ -1194,6 +1195,9 @@ def optimize_crest_factor(
 _Extra: TypeAlias = tuple[str, Sequence[float], Sequence[float], float, float]
 
 def recursive(above: Sequence[float], below: Sequence[float], signals: _Array) -> _Array: ...
+def linear_states(a: _Array, drive: _Array, start: _Array) -> _Array:
+    """States (n_samples + 1, n_states, n_columns) of ``x(t + 1) = A x(t) + v(t)``."""
+
 def torque_regressor(
     robot: Robot,
     q: _Array,

@@ -26,3 +26,33 @@ pub fn filter(above: &[f64], below: &[f64], signals: &mut [f64], columns: usize)
         }
     }
 }
+
+/// States of a linear model at every sample: `x(t + 1) = A x(t) + v(t)`.
+///
+/// `a` is row-major `(n, n)`, `drive` is v in the order `(sample, state, column)`, and `start` is
+/// x(0) in the order `(state, column)`; every column is a separate motion. Returns x(0) to
+/// x(samples) in the order of `drive`. A sample costs n² multiplications and additions a column.
+#[must_use]
+pub fn states(a: &[f64], drive: &[f64], start: &[f64], n: usize) -> Vec<f64> {
+    let size = start.len();
+    let mut out = Vec::with_capacity(drive.len() + size);
+    out.extend_from_slice(start);
+    out.extend_from_slice(drive);
+    if n == 0 || size == 0 {
+        return out;
+    }
+    let columns = size / n;
+    let (mut before, mut rest) = out.split_at_mut(size);
+    while rest.len() >= size {
+        let (next, later) = rest.split_at_mut(size);
+        for (row, factors) in next.chunks_exact_mut(columns).zip(a.chunks_exact(n)) {
+            for (factor, state) in factors.iter().zip(before.chunks_exact(columns)) {
+                for (x, of) in row.iter_mut().zip(state) {
+                    *x += factor * of;
+                }
+            }
+        }
+        (before, rest) = (next, later);
+    }
+    out
+}

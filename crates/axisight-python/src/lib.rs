@@ -71,6 +71,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(local_models::frf_local_model, module)?)?;
     module.add_function(wrap_pyfunction!(local_models::frf_local_periodic, module)?)?;
     module.add_function(wrap_pyfunction!(recursion::recursive, module)?)?;
+    module.add_function(wrap_pyfunction!(recursion::linear_states, module)?)?;
     module.add_function(wrap_pyfunction!(regressor::torque_regressor, module)?)?;
     module.add_function(wrap_pyfunction!(regressor::inertial_parameters, module)?)?;
     module.add_function(wrap_pyfunction!(regressor::energy_regressor, module)?)?;

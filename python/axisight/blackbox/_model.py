@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 from scipy import signal
 
 from axisight.blackbox._data import Complex, Real, lines
-from axisight.blackbox._propagation import states
 from axisight.display.summary import summarized
 from axisight.errors import InputError, MissingExtraError
 from axisight.frf.response import frequency_response
 from axisight.records.experiment import Experiment
+from axisight.statistics.recursion import states
 
 
 @summarized

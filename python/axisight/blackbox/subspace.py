@@ -28,10 +28,10 @@ from scipy import linalg
 
 from axisight.blackbox._data import Complex, Real, fit_percent, gathered, whole
 from axisight.blackbox._model import StateSpaceModel
-from axisight.blackbox._propagation import states
 from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.records.experiment import Experiment
+from axisight.statistics.recursion import states
 
 CHUNK = 4096
 """Rows that are triangularized at a time."""

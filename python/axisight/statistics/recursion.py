@@ -1,4 +1,4 @@
-"""Recursive filters: linear difference equations, and low-passes of Butterworth's kind.
+"""Recursive filters: linear difference equations, states of linear models, and low-passes of Butterworth's kind.
 
 The core solves the difference equations, since ``scipy.signal`` takes longer to load than all filters of a diagnosis
 take to run.
@@ -24,6 +24,18 @@ def recursive(above: Sequence[float], below: Sequence[float], x: Array) -> Array
     """
     signals = np.asarray(x, dtype=np.float64)
     return _core.recursive(above, below, signals.reshape(len(x), -1)).reshape(signals.shape)
+
+
+def states(a: Array, drive: Array, start: Array) -> Array:
+    """Return x(0) to x(n_samples) of ``x(t + 1) = A x(t) + v(t)``, (n_samples + 1, n_states, n_columns).
+
+    ``a`` (n_states, n_states); ``drive``: v(t), (n_samples, n_states, n_columns), where every column is a separate
+    motion; ``start``: x(0), (n_states, n_columns). A sample costs n_states^2 multiplications a column. Raises
+    InputError for other shapes.
+    """
+    if not start.size:
+        return np.zeros((len(drive) + 1, *start.shape))
+    return np.asarray(_core.linear_states(*(np.asarray(x, np.float64) for x in (a, drive, start))))
 
 
 def settled(above: Sequence[float], below: Sequence[float], x: Array) -> Array:

@@ -7,7 +7,6 @@ from scipy import signal
 
 import blackbox_data as known
 from axisight.blackbox import (
-    _propagation,
     output_error,
     residual_tests,
     state_space,
@@ -116,24 +115,6 @@ def test_skipped_samples_are_not_compared() -> None:
     spoilt[:30] += 5.0
     model = output_error(Experiment(known.T, e.input, spoilt), nf=2, nb=2, skip=30)
     np.testing.assert_allclose(model.values, TRUTH, atol=1e-9)
-
-
-@pytest.mark.parametrize("n", [0, 1, 2, 7])
-@pytest.mark.parametrize("samples", [0, 1, 37])
-def test_states_are_those_of_the_recursion(n: int, samples: int, monkeypatch) -> None:
-    """Oracle: one sample after the other; in one block, and in blocks of ten samples or fewer."""
-    rng = np.random.default_rng([n, samples])
-    a, start = rng.normal(size=(n, n)) / max(n, 1) ** 0.5, rng.normal(size=(n, 3))
-    drive = rng.normal(size=(samples, n, 3))
-    wanted = [start]
-    for push in drive:
-        wanted.append(a @ wanted[-1] + push)
-    # Rounding of some 40 sums of 7 products, on values that grow to the largest.
-    bound = 1e-13 * max(np.abs(x).max(initial=1.0) for x in wanted)
-    for numbers in (_propagation.BAND_NUMBERS, 2 * n * n * 10):
-        monkeypatch.setattr(_propagation, "BAND_NUMBERS", numbers)
-        found = _propagation.states(a, drive, start)
-        np.testing.assert_allclose(found, wanted, rtol=0, atol=bound)
 
 
 @pytest.mark.parametrize("direct", [False, True])

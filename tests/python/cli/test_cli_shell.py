@@ -197,7 +197,7 @@ def test_another_shell_is_refused_by_name():
     [
         (["di"], {"diagnose"}),
         (["co"], {"columns", "completion"}),
-        (["identify", ""], {"rigid-body", "axis", "elastic"}),
+        (["identify", ""], {"rigid-body", "axis", "elastic", "multiaxis"}),
         (["diagnose", "--rep"], {"--report"}),
         (["diagnose", "--qui"], {"--quiet"}),
         (["completion", ""], {"bash", "zsh", "fish"}),

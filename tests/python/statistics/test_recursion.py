@@ -7,7 +7,7 @@ import pytest
 import scipy.signal
 
 from axisight.errors import InputError
-from axisight.statistics.recursion import butterworth, recursive, zero_phase
+from axisight.statistics.recursion import butterworth, recursive, states, zero_phase
 from axisight.statistics.spectral_density import welch
 
 WALK = np.cumsum(np.random.default_rng(0).standard_normal((3000, 3)), axis=0)
@@ -41,6 +41,26 @@ def test_a_difference_equation_is_solved_from_rest(shape: tuple[int, ...]):
     above, below = [2.0, -1.0, 0.5], [4.0, -2.8, 0.6]
     expected = scipy.signal.lfilter(above, below, x, axis=0)
     np.testing.assert_allclose(recursive(above, below, x), expected, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 7])
+@pytest.mark.parametrize("samples", [0, 1, 37])
+def test_states_are_those_of_the_recursion(n: int, samples: int):
+    """Oracle: one sample after the other."""
+    rng = np.random.default_rng([n, samples])
+    a, start = rng.normal(size=(n, n)) / max(n, 1) ** 0.5, rng.normal(size=(n, 3))
+    drive = rng.normal(size=(samples, n, 3))
+    wanted = [start]
+    for push in drive:
+        wanted.append(a @ wanted[-1] + push)
+    # Rounding of some 40 sums of 7 products, on values that grow to the largest.
+    bound = 1e-13 * max(np.abs(x).max(initial=1.0) for x in wanted)
+    np.testing.assert_allclose(states(a, drive, start), wanted, rtol=0, atol=bound)
+
+
+def test_states_of_other_shapes_are_refused():
+    with pytest.raises(InputError, match=r"a, drive: expected shapes \(2, 2\)"):
+        states(np.eye(3), np.zeros((5, 2, 1)), np.zeros((2, 1)))
 
 
 @pytest.mark.parametrize("segment", [256, 255, 3000])

@@ -1,6 +1,6 @@
 //! Recursive filters against their difference equation, sample by sample.
 
-use axisight_numerics::recursion::filter;
+use axisight_numerics::recursion::{filter, states};
 
 /// `y[t]` by the equation, from all earlier samples.
 fn by_definition(above: &[f64], below: &[f64], x: &[f64]) -> Vec<f64> {
@@ -37,4 +37,25 @@ fn each_signal_solves_the_difference_equation() {
             assert!((both[2 * t + 1] - other[t]).abs() < 1e-12 * 60.0);
         }
     }
+}
+
+#[test]
+fn states_are_those_of_each_step() {
+    let a = [0.5, -0.3, 0.2, 0.9];
+    let start = [1.0, 0.0, 2.0, -1.0, 0.5, 3.0];
+    let drive: Vec<f64> = (0..60).map(|i| f64::from(i * 37 % 23) - 11.0).collect();
+    let found = states(&a, &drive, &start, 2);
+    assert_eq!(found.len(), 66);
+    assert_eq!(found[..6], start);
+    for t in 0..10 {
+        for (state, row) in a.chunks(2).enumerate() {
+            for column in 0..3 {
+                let at = |sample: usize, i: usize| found[sample * 6 + i * 3 + column];
+                let wanted =
+                    drive[t * 6 + state * 3 + column] + row[0] * at(t, 0) + row[1] * at(t, 1);
+                assert!((at(t + 1, state) - wanted).abs() < 1e-12 * 60.0);
+            }
+        }
+    }
+    assert_eq!(states(&[], &[], &[], 0), Vec::<f64>::new());
 }

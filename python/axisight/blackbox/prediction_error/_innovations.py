@@ -18,7 +18,7 @@ import numpy as np
 from scipy import linalg
 
 from axisight.blackbox._data import Real
-from axisight.blackbox._propagation import states
+from axisight.statistics.recursion import states
 
 LEAST_STATE = 1e-10
 """Directions of the state with less than this share of the largest Gramian are not rescaled."""

@@ -12,7 +12,7 @@ from fnmatch import fnmatchcase
 from axisight.arguments import Lines, did_you_mean, instance, several
 from axisight.display import html
 from axisight.display.summary import summarized
-from axisight.effects import Effect
+from axisight.effects import Effect, effect_info
 from axisight.errors import InputError
 from axisight.fitting import FitOptions, Parameter
 from axisight.graybox.multiaxis.elastic_step import ElasticStep, elastic_step
@@ -20,7 +20,7 @@ from axisight.graybox.multiaxis.findings import between_steps
 from axisight.graybox.multiaxis.joint_step import JointStep, best_joint_step, check_logs
 from axisight.graybox.multiaxis.operating_points import operating_points
 from axisight.graybox.multiaxis.report import report
-from axisight.graybox.multiaxis.rigid_step import DRY_FRICTION, RigidStep, rigid_step
+from axisight.graybox.multiaxis.rigid_step import RigidStep, rigid_step
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -159,7 +159,9 @@ def identify_robot(
 
 def _missing_friction(robot: Robot, given: Sequence[Effect], first: RigidStep) -> list[Effect]:
     """Return the Coulomb frictions of step 1 on axes that have no dry friction."""
-    rubbing = {e.axis for e in (*robot.effects, *given) if e.name in DRY_FRICTION}
+    rubbing = {
+        e.axis for e in (*robot.effects, *given) if effect_info(e.name).law_of == "dry_friction"
+    }
     return [e for e in first.effects if e.axis not in rubbing]
 
 

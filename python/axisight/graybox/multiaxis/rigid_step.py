@@ -22,13 +22,6 @@ from axisight.robot_file.document import render
 
 Real = NDArray[np.float64]
 
-DRY_FRICTION = (
-    "coulomb_friction",
-    "stribeck_friction",
-    "presliding_friction",
-    "asymmetric_friction",
-)
-"""Effects beside which an axis needs no Coulomb friction of its own."""
 _OF_DRIVES = ("motor_inertia", "viscous_friction", "coulomb_friction", "torque_offset")
 
 
