@@ -19,7 +19,10 @@ from playwright.sync_api import expect, sync_playwright
 expect.set_options(timeout=30_000)
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
-_COMMAND = [sys.executable, "-u", "-c", "from axisight.cli import main; main()", "explore"]
+# A shell that started the tests in the background ignores interrupts, and so would the command.
+_LISTEN = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+_RUN = _LISTEN + "from axisight.cli import main; main()"
+_COMMAND = [sys.executable, "-u", "-c", _RUN, "explore"]
 
 
 @dataclass

@@ -16,7 +16,9 @@ from axisight.cli.demo import write_demo_case
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 
-RUN = "from axisight.cli import main; print('begun', flush=True); main()"
+# A shell that started the tests in the background ignores interrupts, and so would the command.
+LISTEN = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+RUN = LISTEN + "from axisight.cli import main; print('begun', flush=True); main()"
 PATIENCE_S = 60.0
 
 
