@@ -57,9 +57,9 @@ def plan(robot: Robot, path: JointPath, limits: Limits, *, grid_points: int = 40
     torques = _Torques(robot, path)
     if bound["torque"] is not None:
         _check_static(robot, torques, grid, bound["torque"])
-    friction = np.zeros(robot.n_axes)
+    reserve = np.zeros(robot.n_axes)
     for _ in range(_ROUNDS):
-        law = _time_law(robot, path, grid, bound, torques, friction)
+        law = _time_law(robot, path, grid, bound, torques, reserve)
         motion = _sampled(robot, torques, law)
         share = _largest_share(motion, bound)
         if share <= 1.0:
@@ -69,7 +69,7 @@ def plan(robot: Robot, path: JointPath, limits: Limits, *, grid_points: int = 40
             break
         # The method cannot count viscous friction: what it makes of the torque is taken from the limit.
         excess = np.abs(motion["torque_nm"].values).max(axis=0) - bound["torque"]
-        friction = friction + np.maximum(excess, 0.0) * 1.05
+        reserve = reserve + np.maximum(excess, 0.0) * 1.05
     raise InputError(
         f"limits: no plan keeps them: the last one takes {share:.1%} of one. "
         "Expected more grid_points, or a smoother path"
@@ -146,9 +146,9 @@ def _time_law(
     grid: Real,
     bound: dict[str, Any],
     torques: _Torques,
-    friction: Real,
+    reserve: Real,
 ) -> Any:
-    """Return the fastest trajectory that TOPP-RA finds; ``friction`` (n_axes,) [Nm] is kept free of torque."""
+    """Return the fastest trajectory that TOPP-RA finds; ``reserve`` (n_axes,) [Nm] is kept of the torque."""
     toppra = _toppra()
     ratio, kept = np.abs(robot.gear_ratio), 1.0 - _MARGIN
     both = np.array([-1.0, 1.0])
@@ -163,7 +163,7 @@ def _time_law(
         def torque(q: Real, v: Real, a: Real) -> Real:
             return np.asarray(torques.without_friction(q[None], v[None], a[None])[0])
 
-        left = np.maximum(kept * bound["torque"] - friction, 0.0)
+        left = np.maximum(kept * bound["torque"] - reserve, 0.0)
         limit = np.outer(left, both)
         constraints.append(
             toppra.constraint.JointTorqueConstraint(torque, limit, np.zeros(robot.n_axes))
