@@ -1006,6 +1006,7 @@ class MonteCarloStudy:
         band_hz: tuple[float, float],
         grid: str,
         peak_rad_s: float,
+        clipping_iterations: int,
         square: tuple[float, float, int] | None,
         directions: str,
         direction_matrix: Sequence[float] | None,

@@ -52,7 +52,7 @@ fn choice<T: Copy>(field: &str, name: &str, table: &[(&str, T)]) -> PyResult<T> 
 #[pymethods]
 impl MonteCarloStudy {
     #[new]
-    #[pyo3(signature = (robot, effects, *, model, integrator, start, period_s, band_hz, grid, peak_rad_s, square, directions, direction_matrix, waiting_periods, periods, noise, noise_cutoff_hz, resolution, output, spread, relative_accuracy))]
+    #[pyo3(signature = (robot, effects, *, model, integrator, start, period_s, band_hz, grid, peak_rad_s, clipping_iterations, square, directions, direction_matrix, waiting_periods, periods, noise, noise_cutoff_hz, resolution, output, spread, relative_accuracy))]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
     fn new(
         robot: &Robot,
@@ -64,6 +64,7 @@ impl MonteCarloStudy {
         band_hz: (f64, f64),
         grid: &str,
         peak_rad_s: f64,
+        clipping_iterations: usize,
         square: Option<SquareTuple>,
         directions: &str,
         direction_matrix: Option<Vec<f64>>,
@@ -122,7 +123,8 @@ impl MonteCarloStudy {
             start: start.unwrap_or_else(|| description.operating_point.clone()),
             model: choice("model", model, &models)?,
             multisine: Multisine::new(period_s, band_hz, grid, peak_rad_s, sample_time)
-                .map_err(input_error)?,
+                .map_err(input_error)?
+                .with_clipping(clipping_iterations),
             square,
             directions: match direction_matrix {
                 Some(matrix) => matrix,

@@ -85,6 +85,7 @@ def core_study(design: str) -> _core.MonteCarloStudy:
             band_hz=tuple(multisine["band_hz"]),
             grid=multisine["grid"],
             peak_rad_s=multisine["peak_rad_s"],
+            clipping_iterations=multisine["clipping_iterations"],
             square=None
             if square is None
             else (square["amplitude_rad_s"], square["period_s"], square["smoothing_samples"]),

@@ -56,12 +56,15 @@ class Multisine(_Model):
 
     ``grid`` selects all multiples of ``1 / period_s`` in the band, or the odd ones. Every run has its
     own phases, and a scale that makes its largest sample ``peak_rad_s`` (motor side).
+    ``clipping_iterations`` of Algorithm 5.1 lower the crest factor of every run: 100 take it from 3.6 to
+    1.55 for some hundred lines. Zero keeps random phases.
     """
 
     period_s: Positive
     band_hz: tuple[Positive, Positive]
     peak_rad_s: Positive
     grid: Literal["all", "odd"] = "all"
+    clipping_iterations: Annotated[int, Field(ge=0, le=100_000)] = 0
 
 
 class Square(_Model):

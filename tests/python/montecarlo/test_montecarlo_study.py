@@ -1,5 +1,6 @@
 """Study files: everything a call can say, and nothing unknown or impossible."""
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -168,3 +169,30 @@ def test_command_without_any_success(tmp_path):
     result, text = command(path, "--out", tmp_path / "o")
     assert "0 runs counted, 3 with failures" in text
     assert result.exit_code == 1
+
+
+def test_clipped_multisines_have_more_power_at_the_same_peak():
+    """Noise alone acts, so standard errors fall as the crest factor does: for 73 lines from 3 to 1.6."""
+    results = []
+    for iterations in (0, 100):
+        signal = mc.Multisine(
+            period_s=2.0, band_hz=(4, 40), peak_rad_s=8, clipping_iterations=iterations
+        )
+        study = small_study(
+            excitation=mc.Excitation(multisine=signal),
+            effect=[],
+            runs=24,
+            # The transient, which grows with the amplitude, has to fall far below the noise.
+            measurement=mc.Measurement(waiting_periods=6),
+        )
+        first, second = (mc.run(study, threads=threads) for threads in (1, 2))
+        same_bits(first, second)
+        results.append(first)
+    ratio = np.median(results[0].standard_error / results[1].standard_error)
+    # 24 runs know a standard error to 15 %, and the median over 73 lines better.
+    assert 1.6 < ratio < 2.4
+
+
+def test_clipping_iterations_are_checked():
+    with pytest.raises(StudyError, match="clipping_iterations"):
+        mc.Multisine(period_s=0.5, band_hz=(4, 40), peak_rad_s=8, clipping_iterations=-1)

@@ -205,6 +205,32 @@ fn multisines_keep_band_grid_and_peak() {
     }
 }
 
+/// Crest factor of the samples of one period of lines of equal amplitude.
+fn crest_factor(x: &[f64]) -> f64 {
+    let peak = x.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+    let power = x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
+    peak / power.sqrt()
+}
+
+#[test]
+fn clipped_multisines_have_a_low_crest_factor() {
+    let random = Multisine::new(2.0, (1.0, 40.0), Grid::All, 8.0, 1e-3).unwrap();
+    let clipped = random.clone().with_clipping(100);
+    for run in 0..5 {
+        let phases = clipped.phases(3, run);
+        assert_eq!(phases, clipped.phases(3, run));
+        let x = clipped.period(&phases);
+        // 79 lines reach 1.5 to 1.6; random phases have 2.7 and more.
+        assert!(crest_factor(&x) < 1.8);
+        assert!(crest_factor(&random.period(&random.phases(3, run))) > 2.2);
+    }
+    assert_ne!(clipped.phases(3, 0), clipped.phases(3, 1));
+    assert_eq!(
+        random.clone().with_clipping(0).phases(3, 0),
+        random.phases(3, 0)
+    );
+}
+
 #[test]
 fn square_waves_are_smoothed_by_a_triangle() {
     let x = Square::new(9.6, 0.5, 40, 5e-4).unwrap().period();

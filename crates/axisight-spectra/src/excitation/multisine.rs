@@ -1,5 +1,6 @@
 //! Random-phase multisines, Wernholt (2004), (7.5).
 
+use super::crest::clipped_phases;
 use super::{ExcitationError, whole_samples};
 use crate::ensemble::{Purpose, generator};
 use axisight_numerics::Dft;
@@ -20,6 +21,7 @@ pub struct Multisine {
     dft: Dft,
     lines: Vec<usize>,
     peak: f64,
+    clipping: usize,
 }
 
 impl Multisine {
@@ -67,7 +69,18 @@ impl Multisine {
             dft: Dft::new(n),
             lines,
             peak,
+            clipping: 0,
         })
+    }
+
+    /// The same with this number of clipping iterations from the random phases of every
+    /// realization, which lower the crest factor. Zero keeps the random phases.
+    #[must_use]
+    pub fn with_clipping(self, iterations: usize) -> Self {
+        Self {
+            clipping: iterations,
+            ..self
+        }
     }
 
     /// Excited lines, as multiples of one over the period.
@@ -80,9 +93,13 @@ impl Multisine {
         &self.dft
     }
 
-    /// Phases of realization `run` [rad], uniform over the circle.
+    /// Phases of realization `run` [rad]: uniform over the circle, then clipped if wanted.
     pub fn phases(&self, seed: u64, run: u64) -> Vec<f64> {
-        random_phases(self.lines.len(), seed, run)
+        let random = random_phases(self.lines.len(), seed, run);
+        match self.clipping {
+            0 => random,
+            iterations => clipped_phases(&self.lines, &random, iterations),
+        }
     }
 
     /// One period with the given phases, scaled to the peak.

@@ -17,10 +17,31 @@ pub use search::{Budget, Found, Start, search};
 
 use super::ExcitationError;
 use axisight_numerics::{LineGrid, LineTransform};
+use clipping::Clipper;
 use nalgebra::Complex;
 
 /// Samples of the grid for peaks, in multiples of twice the highest line.
 pub const FINE_GRID: usize = 32;
+
+/// Phases after `iterations` of the clipping algorithm from the given phases [rad], for lines of
+/// equal amplitude: Wernholt (2004), Algorithm 5.1.
+///
+/// `lines` are distinct and above zero, with one phase each.
+#[must_use]
+pub fn clipped_phases(lines: &[usize], phases: &[f64], iterations: usize) -> Vec<f64> {
+    let problem = CrestProblem {
+        lines: lines.to_vec(),
+        amplitude: vec![1.0; lines.len()],
+        snow_limit: 0.0,
+    };
+    let settings = Clipping {
+        iterations,
+        ..Clipping::default()
+    };
+    let mut found = problem.start(phases);
+    Clipper::new(&problem, settings).run(&mut found, || false);
+    found.into_iter().map(|d| polar(d).1).collect()
+}
 
 /// The wanted lines with their amplitudes, and the lines that may be added.
 #[derive(Debug, Clone)]
