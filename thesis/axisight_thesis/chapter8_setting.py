@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import excitation
-from axisight.effects import Effect
+from axisight.effects import Effect, resolver_ripple, torque_ripple
 from axisight.excitation import Clipping, Multisine, multisine, optimize_crest_factor, square
 from axisight.robot import Robot
 
@@ -152,25 +152,17 @@ def ripple(robot: Robot, start_rad: ArrayLike = 0.0) -> list[Effect]:
     starts = np.broadcast_to(np.asarray(start_rad, float), (robot.n_axes,))
     effects = []
     for axis, torque, start in zip(robot.axis_numbers(), static, starts, strict=True):
-        torques = _terms(TORQUE_RIPPLE_NM, "{}", "_nm", start)
-        torques |= _terms(PROPORTIONAL_RIPPLE, "u", "", start)
-        effects.append(Effect("torque_ripple", axis, torques))
-        held = tuple((n, -a * torque, phase) for n, a, phase in PROPORTIONAL_RIPPLE)
-        effects.append(Effect("torque_ripple", axis, _terms(held, "{}", "_nm", start)))
-        resolver = _terms(RESOLVER_RIPPLE_RAD, "{}", "_rad", start)
-        effects.append(Effect("resolver_ripple", axis, resolver))
+        torques = _turned(TORQUE_RIPPLE_NM, start)
+        shares = _turned(PROPORTIONAL_RIPPLE, start)
+        held = [(n, -share * torque, phase) for n, share, phase in shares]
+        effects += torque_ripple(axis, constant_nm=torques, proportional=shares)
+        effects += torque_ripple(axis, constant_nm=held)
+        effects += resolver_ripple(axis, _turned(RESOLVER_RIPPLE_RAD, start))
     return effects
 
 
-def _terms(
-    sines: tuple[tuple[int, float, float], ...], label: str, unit: str, start_rad: float
-) -> dict[str, float]:
-    """Return ``a sin(n (x + start) + phase)`` as the parameters of a ripple effect."""
-    out = {}
-    for k, (order, amplitude, phase) in enumerate(sines, 1):
-        name = label.format(k)
-        angle = order * start_rad + phase
-        out[f"order_{name}"] = float(order)
-        out[f"cosine_{name}{unit}"] = amplitude * float(np.sin(angle))
-        out[f"sine_{name}{unit}"] = amplitude * float(np.cos(angle))
-    return out
+def _turned(
+    sines: tuple[tuple[int, float, float], ...], start_rad: float
+) -> list[tuple[float, float, float]]:
+    """Return ``a sin(n (x + start) + phase)`` as order, amplitude and phase over x."""
+    return [(float(n), a, n * float(start_rad) + phase) for n, a, phase in sines]

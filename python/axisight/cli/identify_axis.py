@@ -10,7 +10,10 @@ import typer
 import axisight
 from axisight.cli.common import Columns, Force, errors, say
 from axisight.cli.identify_common import (
+    DropPeriods,
+    ExcitedBand,
     Out,
+    PeriodS,
     Unchecked,
     as_options,
     band,
@@ -60,27 +63,9 @@ def axis_command(
     ] = "1",
     out: Out = None,
     columns: Columns = None,
-    period_s: Annotated[
-        float | None,
-        typer.Option(
-            rich_help_panel=EXCITATION, help="Period of the excitation (s). Default: found."
-        ),
-    ] = None,
-    band_hz: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LOW,HIGH",
-            rich_help_panel=EXCITATION,
-            help="Band of the excited lines (Hz); needs --period-s. Default: found from the reference, "
-            "else from the torque.",
-        ),
-    ] = None,
-    drop_periods: Annotated[
-        int | None,
-        typer.Option(
-            rich_help_panel=EXCITATION, help="Periods to drop as transient. Default: found."
-        ),
-    ] = None,
+    period_s: PeriodS = None,
+    band_hz: ExcitedBand = None,
+    drop_periods: DropPeriods = None,
     cutoff_hz: Annotated[
         float, typer.Option(rich_help_panel=EXCITATION, help="Low-pass on the slow motion (Hz).")
     ] = 5.0,

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from axisight.cli.common import numbers, say
-from axisight.cli.panels import ADVANCED
+from axisight.cli.panels import ADVANCED, EXCITATION
 from axisight.errors import AxisightError, InputError, OutputError
 from axisight.gap import RefusedInputError, check_fit_inputs
 from axisight.gap.facts.faults import refused
@@ -46,6 +46,23 @@ Unchecked = Annotated[
         rich_help_panel=ADVANCED,
         help="Take logs in which 'axisight check' finds errors.",
     ),
+]
+PeriodS = Annotated[
+    float | None,
+    typer.Option(rich_help_panel=EXCITATION, help="Period of the excitation (s). Default: found."),
+]
+ExcitedBand = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LOW,HIGH",
+        rich_help_panel=EXCITATION,
+        help="Band of the excited lines (Hz); needs --period-s. Default: found from the reference, "
+        "else from the torque.",
+    ),
+]
+DropPeriods = Annotated[
+    int | None,
+    typer.Option(rich_help_panel=EXCITATION, help="Periods to drop as transient. Default: found."),
 ]
 
 

@@ -10,7 +10,15 @@ import typer
 from axisight.cli.common import Columns, Force, From, To, errors, numbers
 from axisight.cli.frf.files import Targets, write_figure, write_response
 from axisight.cli.frf.words import show
-from axisight.cli.identify_common import Unchecked, as_options, band, options, read_logs
+from axisight.cli.identify_common import (
+    DropPeriods,
+    PeriodS,
+    Unchecked,
+    as_options,
+    band,
+    options,
+    read_logs,
+)
 from axisight.cli.panels import ESTIMATE, EXCITATION
 from axisight.cli.robot import axis_of
 from axisight.errors import InputError
@@ -92,12 +100,7 @@ def frf_command(
             help="Half width of the window of the estimator spectral (Hz).",
         ),
     ] = None,
-    period_s: Annotated[
-        float | None,
-        typer.Option(
-            rich_help_panel=EXCITATION, help="Period of the excitation (s). Default: found."
-        ),
-    ] = None,
+    period_s: PeriodS = None,
     band_hz: Annotated[
         str | None,
         typer.Option(
@@ -106,12 +109,7 @@ def frf_command(
             help="Band to estimate (Hz). Default: all excited lines.",
         ),
     ] = None,
-    drop_periods: Annotated[
-        int | None,
-        typer.Option(
-            rich_help_panel=EXCITATION, help="Periods to drop as transient. Default: found."
-        ),
-    ] = None,
+    drop_periods: DropPeriods = None,
     start_s: From = 0.0,
     stop_s: To = None,
     plot: Annotated[
