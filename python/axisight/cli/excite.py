@@ -178,7 +178,7 @@ def excite_command(
     plot: Annotated[
         Path | None,
         typer.Option(
-            help="Draw the signal here, and the references in NAME-references (.png or .pdf)."
+            help="Draw the signal here, and the references in NAME-references (.png, .pdf or .svg)."
         ),
     ] = None,
     force: Annotated[

@@ -107,7 +107,7 @@ def plan_command(
         begin = ", ".join(f"{x:.4g}" for x in motion["joint_position_rad"].values[0])
         say(
             f"{motion.attrs['duration_s']:.4g} s from rest to rest, starts at joint positions {begin}; "
-            f"takes up to {motion.attrs['largest_share']:.1%} of a limit"
+            f"takes up to {motion.attrs['largest_share']:.1%} of {motion.attrs['reached']}"
         )
         for written in write_references(motion_references(motion), out):
             say(f"written: {written}")

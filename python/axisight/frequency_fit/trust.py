@@ -128,8 +128,8 @@ def _outlier(data: Sequence[MeasuredResponse], residual: Complex, misfit: float)
             return (
                 f"response {number}: the line at {one.frequency_hz[line]:.4g} Hz (output "
                 f"{output + 1}, input {source + 1}) is {size[place] / np.sqrt(mean):.1f} times as "
-                "far off as the others: look at it, leave it out (infinite variance), or use "
-                "loss='huber'"
+                "far off as the others: look at it, leave the line out, or give it less weight "
+                "(loss='huber', --robust)"
             )
         place -= one.response.size
     return None

@@ -46,7 +46,8 @@ def plan(robot: Robot, path: JointPath, limits: Limits, *, grid_points: int = 40
       A velocity reference that is held for one sample moves the motor to the next position;
     - ``acceleration_rad_s2``, ``torque_nm``: of the motors.
 
-    Attributes: ``duration_s`` and ``largest_share``, the largest share of a limit [1].
+    Attributes: ``duration_s``, ``largest_share``, the largest share of a limit [1], and ``reached``, which limit
+    that is: its name and the axis.
     Raises InputError if a limit is missing or the static torque alone passes it, and MissingExtraError without toppra.
 
     """
@@ -61,9 +62,13 @@ def plan(robot: Robot, path: JointPath, limits: Limits, *, grid_points: int = 40
     for _ in range(_ROUNDS):
         law = _time_law(robot, path, grid, bound, torques, reserve)
         motion = _sampled(robot, torques, law)
-        share = _largest_share(motion, bound)
+        share, reached = _largest_share(motion, bound)
         if share <= 1.0:
-            motion.attrs |= {"duration_s": float(law.duration), "largest_share": share}
+            motion.attrs |= {
+                "duration_s": float(law.duration),
+                "largest_share": share,
+                "reached": reached,
+            }
             return motion
         if bound["torque"] is None:
             break
@@ -71,7 +76,7 @@ def plan(robot: Robot, path: JointPath, limits: Limits, *, grid_points: int = 40
         excess = np.abs(motion["torque_nm"].values).max(axis=0) - bound["torque"]
         reserve = reserve + np.maximum(excess, 0.0) * 1.05
     raise InputError(
-        f"limits: no plan keeps them: the last one takes {share:.1%} of one. "
+        f"limits: no plan keeps them: the last one takes {share:.1%} of {reached}. "
         "Expected more grid_points, or a smoother path"
     )
 
@@ -85,7 +90,7 @@ def motion_references(motion: xr.Dataset) -> References:
     if "velocity_ref_rad_s" not in motion or len(motion["time"]) < 2:
         raise InputError("motion: expected a dataset of plan, with velocity_ref_rad_s")
     step = float(motion["time"][1] - motion["time"][0])
-    design = {"kind": "path"} | {name: float(x) for name, x in motion.attrs.items()}
+    design = {"kind": "path"} | dict(motion.attrs)
     return References(step, motion["velocity_ref_rad_s"].values[np.newaxis], design=design)
 
 
@@ -215,12 +220,14 @@ def _sampled(robot: Robot, torques: _Torques, law: Any) -> xr.Dataset:
     )
 
 
-def _largest_share(motion: xr.Dataset, bound: dict[str, Any]) -> float:
-    """Return the largest share of a limit that the motion takes [1]."""
+def _largest_share(motion: xr.Dataset, bound: dict[str, Any]) -> tuple[float, str]:
+    """Return the largest share of a limit that the motion takes [1], and the name of that limit with its axis."""
     names = ("velocity_ref_rad_s", "acceleration_rad_s2", "torque_nm")
-    found = [
-        np.abs(motion[name].values).max(axis=0) / limit
-        for name, limit in zip(names, bound.values(), strict=True)
+    found = {
+        what: np.abs(motion[name].values).max(axis=0) / limit
+        for name, (what, limit) in zip(names, bound.items(), strict=True)
         if limit is not None
-    ]
-    return float(np.max(found))
+    }
+    what = max(found, key=lambda name: float(found[name].max()))
+    axis = int(np.argmax(found[what]))
+    return float(found[what][axis]), f"the {what} limit of axis {axis + 1}"

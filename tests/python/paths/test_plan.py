@@ -66,6 +66,11 @@ def test_limits_are_kept_and_one_of_them_is_always_at_work(arm):
     )
     assert shares.max() <= 1.0
     assert shares.max() == pytest.approx(motion.attrs["largest_share"])
+    what, _, axis = np.unravel_index(np.argmax(shares), shares.shape)
+    assert (
+        motion.attrs["reached"]
+        == f"the {('velocity', 'acceleration', 'torque')[what]} limit of axis {axis + 1}"
+    )
     # The fastest motion has a limit at work at every moment (Pontryagin). What is taken from the torque for
     # viscous friction, 2 Nm of 60, is not there when the motor is slow.
     at_work = shares.max(axis=(0, 2))[1:-2]

@@ -114,7 +114,9 @@ def frf_command(
     stop_s: To = None,
     plot: Annotated[
         Path | None,
-        typer.Option(help="Draw the response with its noise and distortion here (.png or .pdf)."),
+        typer.Option(
+            help="Draw the response with its noise and distortion here (.png, .pdf or .svg)."
+        ),
     ] = None,
     unchecked: Unchecked = False,
     force: Force = False,

@@ -15,7 +15,7 @@ from axisight.frequency_fit import MeasuredResponse
 from axisight.frf.mfrf import mfrf
 from axisight.graybox.multiaxis.starts import mean_angle
 from axisight.logs import Log
-from axisight.records import prepare_records
+from axisight.records import FindingKind, RecordFinding, prepare_records
 from axisight.robot import Robot
 
 SAME_POSE_RAD = 0.05
@@ -65,7 +65,7 @@ def operating_points(
         raise InputError(
             f"broadband: expected {robot.n_axes} logs of one pose and load with different excitations, got "
             f"at most {max(len(g) for g in _groups(robot, logs))}: record them, or give starts "
-            "(responses=False)"
+            "(responses=False, --no-responses)"
         )
     return found, findings
 
@@ -103,5 +103,17 @@ def _point(
     return OperatingPoint(
         names,
         response.with_load(logs[0].load),
-        tuple(f"{', '.join(names)}: {finding.message}" for finding in prepared.serious),
+        _worst(prepared.serious),
+    )
+
+
+def _worst(findings: Sequence[RecordFinding]) -> tuple[str, ...]:
+    """Return the text of the worst finding of each kind, with the number of others like it."""
+    kinds: dict[FindingKind, list[RecordFinding]] = {}
+    for finding in findings:
+        kinds.setdefault(finding.kind, []).append(finding)
+    return tuple(
+        max(alike, key=lambda f: float(np.nan_to_num(f.value))).message
+        + (f" (the worst of {len(alike)} like it)" if len(alike) > 1 else "")
+        for alike in kinds.values()
     )

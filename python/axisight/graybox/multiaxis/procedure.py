@@ -18,7 +18,7 @@ from axisight.fitting import FitOptions, Parameter
 from axisight.graybox.multiaxis.elastic_step import ElasticStep, elastic_step
 from axisight.graybox.multiaxis.findings import between_steps
 from axisight.graybox.multiaxis.joint_step import JointStep, best_joint_step, check_logs
-from axisight.graybox.multiaxis.operating_points import operating_points
+from axisight.graybox.multiaxis.operating_points import OperatingPoint, operating_points
 from axisight.graybox.multiaxis.report import report
 from axisight.graybox.multiaxis.rigid_step import RigidStep, rigid_step
 from axisight.logs import Log
@@ -147,7 +147,7 @@ def identify_robot(
     findings = (
         *first.findings,
         *lost,
-        *(text for point in found for text in point.findings),
+        *_of_points(found),
         *second.findings,
         *third.findings,
         *between_steps(second, third, [log.name for log in logs]),
@@ -155,6 +155,15 @@ def identify_robot(
     return RobotIdentification(
         first, second, third, tuple(log.name for log in logs), tuple(dict.fromkeys(findings))
     )
+
+
+def _of_points(points: Sequence[OperatingPoint]) -> list[str]:
+    """Return the findings of the points, each once with the logs that it holds for."""
+    logs: dict[str, list[str]] = {}
+    for point in points:
+        for text in point.findings:
+            logs.setdefault(text, []).extend(point.logs)
+    return [f"{', '.join(dict.fromkeys(names))}: {text}" for text, names in logs.items()]
 
 
 def _missing_friction(robot: Robot, given: Sequence[Effect], first: RigidStep) -> list[Effect]:
