@@ -37,8 +37,8 @@ from axisight.frf.response import frequency_response
 from axisight.records.experiment import Experiment
 from axisight.statistics.least_squares import unit_columns
 
-CHUNK = 8192
-"""Rows of the regressor that are triangularized at a time."""
+CHUNK = 2048
+"""Rows of a narrow regressor that are triangularized at a time: a block that stays in the cache."""
 
 
 @dataclass(frozen=True)
@@ -263,20 +263,22 @@ def triangularized(
             labels += [("u", j, lag) for lag in range(first, end + 1)]
     width = len(labels) + p
     r = np.zeros((0, width))
-    n_rows = 0
+    # The triangle so far is triangularized again with each block, so wide blocks get more rows.
+    rows, n_rows = max(CHUNK, 4 * width), 0
     for e in data:
         n = e.n_samples - most
-        signals = {"y": -e.output.T, "u": e.input.T}
-        for start in range(0, max(n, 0), CHUNK):
-            stop = min(start + CHUNK, n)
+        # Channels in a row each: a lag is then one plain copy.
+        signals = {"y": np.ascontiguousarray(-e.output.T), "u": np.ascontiguousarray(e.input.T)}
+        for start in range(0, max(n, 0), rows):
+            stop = min(start + rows, n)
             block = np.empty((len(r) + stop - start, width), order="F")
             block[: len(r)] = r
             for k, (kind, channel, lag) in enumerate(labels):
                 at = most - lag
                 block[len(r) :, k] = signals[kind][channel, start + at : stop + at]
             block[len(r) :, len(labels) :] = e.output[start + most : stop + most]
-            (r,) = linalg.qr(block, mode="r", overwrite_a=True, check_finite=False)
-            r = r[:width]
+            # The raw form comes with the triangle alone; the others clear the whole matrix below it.
+            _, r = linalg.qr(block, mode="raw", overwrite_a=True, check_finite=False)
         n_rows += max(n, 0)
     widest = int(max((na.sum(axis=1) + nb.sum(axis=1)).max(), 1))
     if n_rows <= widest:
