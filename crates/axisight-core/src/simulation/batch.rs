@@ -9,7 +9,7 @@
 
 use super::linear::{LinearPlant, LinearPlantError, simulate_linear};
 use crate::plant::{Plant, PlantError, assemble, stepper};
-use crate::robot::{EffectSetting, RobotDescription};
+use crate::robot::{EffectSetting, RobotDescription, n_readings};
 use axisight_plant::simulation::{
     Drive, Effort, Method, Run, Sample, SimulationError, Status, Stepper, simulate,
 };
@@ -89,6 +89,8 @@ pub struct Traces {
     pub torque_disturbance: Vec<f64>,
     /// Error of the measured positions [rad], per axis.
     pub position_disturbance: Vec<f64>,
+    /// Readings of the accelerometers [m/s^2], per direction.
+    pub specific_force: Vec<f64>,
 }
 
 /// Status and effort of a run.
@@ -153,6 +155,7 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
         }
         .into());
     }
+    let n_readings = n_readings(&batch.robot.accelerometers);
     let size = n_samples * n_axes;
     let zeros = |columns: usize| vec![0.0; runs.len() * n_samples * columns];
     let mut traces = Traces {
@@ -163,10 +166,14 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
         joint: zeros(n_joints),
         torque_disturbance: zeros(n_axes),
         position_disturbance: zeros(n_axes),
+        specific_force: zeros(n_readings),
     };
     // Chunks of length zero panic; with no samples there is nothing to cut.
     let per_axis = (size * width).max(1);
     let per_joint = (n_samples * n_joints * width).max(1);
+    let per_reading = (n_samples * n_readings * width).max(1);
+    // Without accelerometers, no group has readings.
+    let mut readings = traces.specific_force.chunks_mut(per_reading);
     let mut groups: Vec<Group<'_>> = Vec::new();
     let parts = traces
         .command
@@ -180,7 +187,15 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
         groups.push(Group {
             runs: (i * width..((i + 1) * width).min(runs.len())).collect(),
             n_samples,
-            signals: [command, measured, motor, joint, torque, position],
+            signals: [
+                command,
+                measured,
+                motor,
+                joint,
+                torque,
+                position,
+                readings.next().unwrap_or_default(),
+            ],
         });
     }
     let outcomes: Vec<Vec<Outcome>> = groups
@@ -194,8 +209,9 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
 struct Group<'a> {
     runs: Vec<usize>,
     n_samples: usize,
-    /// Command, measured and motor position, joint position, torque and position disturbance.
-    signals: [&'a mut [f64]; 6],
+    /// Command, measured and motor position, joint position, torque and position disturbance,
+    /// readings of accelerometers.
+    signals: [&'a mut [f64]; 7],
 }
 
 impl Group<'_> {
@@ -315,7 +331,7 @@ impl Group<'_> {
         joints: &Range<usize>,
     ) {
         let n = self.n_samples;
-        let [command, measured, motor, joint, torque, position] = &mut self.signals;
+        let [command, measured, motor, joint, torque, position, readings] = &mut self.signals;
         let keep = |to: &mut [f64], values: &[S]| {
             for (slot, lane) in lanes.iter().enumerate() {
                 let row = (lane * n + sample.index) * values.len();
@@ -330,6 +346,7 @@ impl Group<'_> {
         keep(measured, sample.measured);
         keep(torque, sample.torque_disturbance);
         keep(position, sample.position_disturbance);
+        keep(readings, sample.specific_force);
         keep(joint, &sample.state[joints.clone()]);
         for (slot, lane) in lanes.iter().enumerate() {
             let row = (lane * n + sample.index) * motors.len();
@@ -368,6 +385,7 @@ impl Batch<'_> {
             noise: &noise,
             resolution: self.resolution,
             disturbances: true,
+            accelerometers: true,
             method: self.method,
             cancel: self.cancel,
         })
