@@ -477,7 +477,8 @@ class Robot:
         """
         (rows, rates, accelerations), single = self._rows(q=q, v=v, a=a)
         out = _core.specific_force(self.core, rows, rates, accelerations)
-        by_place = by_direction(out, self.accelerometers)
+        # Without readings, the core cannot say how many rows there are.
+        by_place = by_direction(out.reshape(len(rows), out.shape[1]), self.accelerometers)
         return by_place[0] if single else by_place
 
     def pose(self, q: ArrayLike, joint: int | str = -1) -> tuple[Array, Array]:

@@ -67,9 +67,10 @@ def simulate(
     Dataset with dims (time, axis) and (time, joint): ``torque_cmd_nm``,
     ``position_rad`` (measured), ``motor_position_rad`` and
     ``joint_position_rad`` (true), ``torque_disturbance_nm``,
-    ``position_disturbance_rad``. A robot with accelerometers also has
-    ``acceleration_m_s2`` (time, accelerometer, direction): their readings, without noise.
-    ``attrs["status"]`` is ``completed``, ``diverged`` or ``step_size_collapsed`` (an unstable loop ends as either of these two, and the
+    ``position_disturbance_rad``. A robot with accelerometers also has their readings
+    ``acceleration_m_s2`` (time, accelerometer, direction), without noise: acceleration minus gravity,
+    before the command of the sample acts. ``attrs["status"]`` is ``completed``,
+    ``diverged`` or ``step_size_collapsed`` (an unstable loop ends as either of these two, and the
     arrays then end at the failed sample). Further attributes count steps and evaluations.
 
     Raises InputError for wrong shapes, non-finite input, unknown effects or a missing controller.
