@@ -829,9 +829,7 @@ def state_at_rest(robot: Robot, effects: _Effects, joint_angle: Sequence[float])
 
 def accelerometers(
     robot: Robot,
-) -> list[
-    tuple[str, str, list[float], list[list[float]]]
-]:
+) -> list[tuple[str, str, list[float], list[list[float]]]]:
     """Return name, joint, position [m] and directions of each accelerometer."""
 
 def specific_force(robot: Robot, q: _Array, v: _Array, a: _Array) -> _Array:

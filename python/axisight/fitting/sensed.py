@@ -79,7 +79,8 @@ def acceleration_readings(robot: Robot, log: Log) -> Array | None:
         if name not in known:
             raise InputError(
                 f"{log.name}: acceleration_m_s2: expected accelerometers of the robot "
-                f"({', '.join(known) or 'it has none'}), got {name!r}{did_you_mean(name, known)}"
+                f"({', '.join(known) or 'it has none'}), got {name!r}{did_you_mean(name, known)}; state it as "
+                "[[accelerometer]] in the robot file, or leave it out of the log"
             )
         if np.isfinite(readings[:, known[name] :]).any():
             raise InputError(

@@ -93,6 +93,50 @@ pub struct Traces {
     pub specific_force: Vec<f64>,
 }
 
+impl Traces {
+    fn zeros(robot: &RobotDescription, n_runs: usize, n_samples: usize) -> Self {
+        let (n_axes, n_joints) = (robot.n_axes().max(1), robot.n_joints().max(1));
+        let zeros = |columns: usize| vec![0.0; n_runs * n_samples * columns];
+        Self {
+            n_samples,
+            command: zeros(n_axes),
+            measured: zeros(n_axes),
+            motor: zeros(n_axes),
+            joint: zeros(n_joints),
+            torque_disturbance: zeros(n_axes),
+            position_disturbance: zeros(n_axes),
+            specific_force: zeros(n_readings(&robot.accelerometers)),
+        }
+    }
+
+    /// The runs in groups of `width`, each with its part of every signal; none without samples.
+    fn groups(&mut self, n_runs: usize, width: usize) -> Vec<Group<'_>> {
+        let n_samples = self.n_samples;
+        let mut parts = [
+            &mut self.command,
+            &mut self.measured,
+            &mut self.motor,
+            &mut self.joint,
+            &mut self.torque_disturbance,
+            &mut self.position_disturbance,
+            &mut self.specific_force,
+        ]
+        .map(|signal| {
+            // Chunks of length zero panic. A signal without columns has no chunks.
+            let each = (signal.len() / n_runs.max(1) * width).max(1);
+            signal.chunks_mut(each)
+        });
+        let starts = (0..n_runs).step_by(width).filter(|_| n_samples > 0);
+        starts
+            .map(|first| Group {
+                runs: (first..(first + width).min(n_runs)).collect(),
+                n_samples,
+                signals: parts.each_mut().map(|part| part.next().unwrap_or_default()),
+            })
+            .collect()
+    }
+}
+
 /// Status and effort of a run.
 #[derive(Debug, Clone, Copy)]
 pub struct Outcome {
@@ -130,7 +174,7 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
         Model::Nonlinear => None,
     };
     let runs = batch.input.runs();
-    let (n_axes, n_joints) = (batch.robot.n_axes().max(1), batch.robot.n_joints().max(1));
+    let n_axes = batch.robot.n_axes().max(1);
     let n_samples = runs.first().map_or(0, |r| r.len() / n_axes);
     if let Some(i) = runs.iter().position(|r| r.len() != n_samples * n_axes) {
         let expected = format!("{n_samples} samples in every run");
@@ -155,49 +199,8 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
         }
         .into());
     }
-    let n_readings = n_readings(&batch.robot.accelerometers);
-    let size = n_samples * n_axes;
-    let zeros = |columns: usize| vec![0.0; runs.len() * n_samples * columns];
-    let mut traces = Traces {
-        n_samples,
-        command: zeros(n_axes),
-        measured: zeros(n_axes),
-        motor: zeros(n_axes),
-        joint: zeros(n_joints),
-        torque_disturbance: zeros(n_axes),
-        position_disturbance: zeros(n_axes),
-        specific_force: zeros(n_readings),
-    };
-    // Chunks of length zero panic; with no samples there is nothing to cut.
-    let per_axis = (size * width).max(1);
-    let per_joint = (n_samples * n_joints * width).max(1);
-    let per_reading = (n_samples * n_readings * width).max(1);
-    // Without accelerometers, no group has readings.
-    let mut readings = traces.specific_force.chunks_mut(per_reading);
-    let mut groups: Vec<Group<'_>> = Vec::new();
-    let parts = traces
-        .command
-        .chunks_mut(per_axis)
-        .zip(traces.measured.chunks_mut(per_axis))
-        .zip(traces.motor.chunks_mut(per_axis))
-        .zip(traces.joint.chunks_mut(per_joint))
-        .zip(traces.torque_disturbance.chunks_mut(per_axis))
-        .zip(traces.position_disturbance.chunks_mut(per_axis));
-    for (i, (((((command, measured), motor), joint), torque), position)) in parts.enumerate() {
-        groups.push(Group {
-            runs: (i * width..((i + 1) * width).min(runs.len())).collect(),
-            n_samples,
-            signals: [
-                command,
-                measured,
-                motor,
-                joint,
-                torque,
-                position,
-                readings.next().unwrap_or_default(),
-            ],
-        });
-    }
+    let mut traces = Traces::zeros(batch.robot, runs.len(), n_samples);
+    let mut groups = traces.groups(runs.len(), width);
     let outcomes: Vec<Vec<Outcome>> = groups
         .par_iter_mut()
         .map(|group| group.simulate(batch, linear.as_ref()))
