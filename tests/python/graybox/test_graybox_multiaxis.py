@@ -9,6 +9,7 @@ from axisight import Effect, InputError, Log, simulate
 from axisight.graybox import RobotIdentification, identified_robot, identify_robot
 from axisight.graybox.multiaxis.operating_points import operating_points
 from axisight.graybox.multiaxis.starts import from_its_start
+from axisight.graybox.multiaxis.weightings import Sensors
 from axisight.logs import Load
 from axisight.robot import Accelerometer
 from axisight.robot_file import Provenance, write_identified
@@ -156,6 +157,19 @@ def test_accelerometers_take_part(logs: list[Log]) -> None:
     assert (fit.std < 0.5 * without.joint.fit.std).all()
     with pytest.raises(InputError, match=r"\[\[accelerometer\]\] in the robot file"):
         identify_robot(ROBOT, [sensed], **options)
+
+
+def test_a_reading_that_a_log_lacks_does_not_sharpen_the_others(logs: list[Log]) -> None:
+    """White residuals of one; two of three logs lack the last joint encoder, whose weight would be 1.7."""
+    rng = np.random.default_rng(0)
+    some = [replace(log, joint_position_rad=log.position_rad) for log in logs[:3]]
+    residuals = [rng.normal(size=(4000, 6)) for _ in some]
+    for residual in residuals[1:]:
+        residual[:, 5] = 0.0
+    _, joints, readings = Sensors.of(some).weightings(ROBOT, some, residuals)
+    assert joints is not None and readings is None
+    # Four times the scatter of bands of a thousand lines, as in test_fit_of_many.py.
+    np.testing.assert_allclose(joints.weight[:, -2:], 1.0, rtol=0.08)
 
 
 def test_misuse(logs: list[Log]) -> None:

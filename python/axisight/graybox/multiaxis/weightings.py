@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,21 @@ class Sensors:
         readings = [r[:, behind:] for r, log in pairs if log.acceleration_m_s2]
         return (
             motors,
-            spectral_weighting(joints, step) if joints else None,
-            spectral_weighting(readings, step) if readings else None,
+            _of_present(joints, step) if joints else None,
+            _of_present(readings, step) if readings else None,
         )
+
+
+def _of_present(residuals: Sequence[Real], step: float) -> Weighting:
+    """Return the spectral weighting of readings (n, n_readings), each from the logs that have it.
+
+    A reading that a log lacks is zero throughout, and would make the others look too exact.
+    """
+    common = spectral_weighting(residuals, step)
+    weight = common.weight.copy()
+    for place, row in enumerate(weight):
+        present = [r[:, [place]] for r in residuals if r[:, place].any()]
+        if 0 < len(present) < len(residuals):
+            own = spectral_weighting(present, step)
+            row[:] = np.interp(common.frequency_hz, own.frequency_hz, own.weight[0])
+    return replace(common, weight=weight)
