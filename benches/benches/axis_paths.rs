@@ -111,6 +111,7 @@ fn through_plant<S: Scalar>(robot: &RobotDescription, torque: &[f64]) -> Respons
         noise: &[],
         resolution: 0.0,
         disturbances: false,
+        accelerometers: false,
         method: Method::RungeKutta4 { substeps: 1 },
         cancel: None,
     };

@@ -76,6 +76,7 @@ fn closed_loop<S: Scalar>(c: &mut Criterion, label: &str) {
         noise: &[],
         resolution: 0.0,
         disturbances: false,
+        accelerometers: false,
         method: Method::RungeKutta4 { substeps: 1 },
         cancel: None,
     };

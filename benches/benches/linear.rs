@@ -59,6 +59,7 @@ impl Case {
             noise: &noise,
             resolution: 0.0,
             disturbances: false,
+            accelerometers: false,
             method: Method::default(),
             cancel: None,
         };

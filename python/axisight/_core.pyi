@@ -31,10 +31,12 @@ __all__ = [
     "Robot",
     "SimulatedLogs",
     "__version__",
+    "accelerometers",
     "axis_fit",
     "axis_linearize",
     "axis_simulate",
     "check_integrator",
+    "described_as",
     "design_poses",
     "directions",
     "effect_table",
@@ -58,6 +60,7 @@ __all__ = [
     "regression_factors",
     "right_divide_matrices",
     "simulate_batch",
+    "specific_force",
     "square_period",
     "state_at_rest",
     "state_rates",
@@ -75,6 +78,7 @@ _Effect: TypeAlias = tuple[str, int | tuple[int, int] | None, _Numbers]
 _Effects: TypeAlias = Sequence[_Effect]
 # Frequencies [Hz], weights [1/unit of the residual], decimation; one per axis.
 _Weighting: TypeAlias = tuple[_Numbers, _Numbers, int]
+_Sensed: TypeAlias = tuple[Literal["joint_angle", "acceleration"], int, _Weighting]
 _Model: TypeAlias = Literal["nonlinear", "linear"]
 
 @type_check_only
@@ -216,7 +220,8 @@ class BatchOutput(TypedDict):
     """What simulated runs recorded, by run.
 
     Arrays have shape (n_runs, n_samples, n_axes) except ``joint_position_rad`` (n_runs,
-    n_samples, n_joints). ``position_rad`` is the measurement: ``motor_position_rad`` plus
+    n_samples, n_joints) and ``acceleration_m_s2`` (n_runs, n_samples, n_readings), which is there if the
+    robot has accelerometers. ``position_rad`` is the measurement: ``motor_position_rad`` plus
     ``position_disturbance_rad``, which includes the noise. ``status`` is "completed",
     "diverged", "step_size_collapsed" or "cancelled"; ``stopped_at`` the sample (from 0) at which a
     run that did not complete ended, after which it is NaN. The counters are right-hand sides,
@@ -230,6 +235,7 @@ class BatchOutput(TypedDict):
     joint_position_rad: _Array
     torque_disturbance_nm: _Array
     position_disturbance_rad: _Array
+    acceleration_m_s2: NotRequired[_Array]
     status: list[str]
     stopped_at: list[int | None]
     evaluations: list[int]
@@ -821,6 +827,17 @@ def simulate_batch(
 def state_at_rest(robot: Robot, effects: _Effects, joint_angle: Sequence[float]) -> _Array:
     """Return the state (n_states,) at rest at angles (n_joints,) [rad] of `state_rates`."""
 
+def accelerometers(
+    robot: Robot,
+) -> list[tuple[str, str, list[float], list[list[float]]]]:
+    """Return name, joint, position [m] and directions of each accelerometer."""
+
+def specific_force(robot: Robot, q: _Array, v: _Array, a: _Array) -> _Array:
+    """Return the readings (m, n_readings) of the accelerometers [m/s^2] along motions (m, n_joints)."""
+
+def described_as(robot: Robot, text: str) -> Robot:
+    """Return the same robot with another description; changed parameters, effects and controller stay."""
+
 def state_rates(robot: Robot, effects: _Effects, state: _Array, torque: Sequence[float]) -> _Array:
     """Return the rates (m, n_states) of states under delivered motor torques (n_axes,) [Nm].
 
@@ -855,10 +872,11 @@ class SimulatedLogs:
     factor on the weighted error of its sample, None for one everywhere. Every run begins at rest, at
     ``start`` (n_axes,) [rad], None for the operating point; the first ``lead`` samples of input and target,
     of which the certainty has none, are simulated and not compared. ``weighting`` has one entry per axis.
-    With ``joint_weighting``, one entry per axis, the angles of the driven joints are compared as well, with
-    ``joint`` [rad], shaped as the input, one per log; NaN on an axis, or None, for joints without an encoder.
-    The mean error of each joint over a log is removed. Joints count as further axes in the blocks. ``own``
-    are (effect, parameter, value), both from 0, that hold in one log only.
+    ``sensed`` are readings of sensors on the arm that are compared as well: kind, index (from 0) and weighting
+    of each. A ``joint_angle`` [rad] belongs to an axis, an ``acceleration`` [m/s^2] is one of the readings of
+    `specific_force`. ``readings`` holds the measured ones (n_samples, n_sensed) of each log; NaN, or None, for
+    sensors that it lacks. The mean error of each reading over a log is removed. Readings count as further axes
+    in the blocks. ``own`` are (effect, parameter, value), both from 0, that hold in one log only.
     ``block_s`` [s] is the length of the blocks of `FitResult.blocks`; ``integrator`` by default rk4 with one
     step a sample.
     """
@@ -871,8 +889,8 @@ class SimulatedLogs:
         *,
         input: Literal["reference", "torque", "tracking"] = "reference",
         output: Literal["torque", "position"] = "torque",
-        joint: Sequence[_Array | None] = ...,
-        joint_weighting: Sequence[_Weighting] = ...,
+        sensed: Sequence[_Sensed] = ...,
+        readings: Sequence[_Array | None] = ...,
         own: Sequence[Sequence[tuple[int, int, float]]] = ...,
         block_s: float = 1.0,
         integrator: IntegratorSpec | None = None,

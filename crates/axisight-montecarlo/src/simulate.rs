@@ -159,6 +159,7 @@ fn lock_step<S: Scalar>(group: &Group<'_>, jobs: &[Job]) -> Result<Vec<Outcome>,
         noise: &noises,
         resolution: settings.resolution,
         disturbances: false,
+        accelerometers: false,
         method: group.plant.method(),
         cancel: Some(group.cancel),
     };

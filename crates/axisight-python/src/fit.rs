@@ -5,7 +5,8 @@ use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, detached, flag, input_error};
 use crate::fit_results::{Column, Ended, FitResult, Linearization, problem_error};
 use crate::fit_specs::{
-    OptionSpec, ParameterSpec, WeightingTuple, loss, options, parameters, weightings,
+    OptionSpec, ParameterSpec, SensedTuple, WeightingTuple, loss, options, parameters,
+    sensed_outputs, weightings,
 };
 use crate::robot::Robot;
 use crate::simulation::IntegratorSpec;
@@ -130,7 +131,7 @@ fn simulation_output(name: &str) -> PyResult<SimulationOutput> {
 #[pymethods]
 impl SimulatedLogs {
     #[new]
-    #[pyo3(signature = (robot, records, weighting, *, input="reference", output="torque", joint=Vec::new(), joint_weighting=Vec::new(), own=Vec::new(), block_s=1.0, integrator=None))]
+    #[pyo3(signature = (robot, records, weighting, *, input="reference", output="torque", sensed=Vec::new(), readings=Vec::new(), own=Vec::new(), block_s=1.0, integrator=None))]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
     fn new(
         robot: &Robot,
@@ -138,14 +139,15 @@ impl SimulatedLogs {
         weighting: Vec<WeightingTuple>,
         input: &str,
         output: &str,
-        joint: Vec<Option<PyReadonlyArray2<'_, f64>>>,
-        joint_weighting: Vec<WeightingTuple>,
+        sensed: Vec<SensedTuple>,
+        readings: Vec<Option<PyReadonlyArray2<'_, f64>>>,
         own: Vec<Vec<(usize, usize, f64)>>,
         block_s: f64,
         integrator: Option<IntegratorSpec>,
     ) -> PyResult<Self> {
         let robot = robot.description.clone();
         let n_axes = robot.n_axes();
+        let sensed = sensed_outputs(sensed)?;
         let values = |number: usize| {
             let given = own.get(number).into_iter().flatten();
             let value = |(effect, parameter, value): &(usize, usize, f64)| OwnValue {
@@ -157,13 +159,13 @@ impl SimulatedLogs {
         };
         let record = |(number, (i, t, c, start, lead)): (usize, RecordTuple<'_>)| {
             let certainty = c.map(|c| rows(&c, "certainty", n_axes));
-            let joint = joint.get(number).and_then(Option::as_ref);
-            let joint = joint.map(|j| rows(j, "joint", n_axes));
+            let read = readings.get(number).and_then(Option::as_ref);
+            let read = read.map(|r| rows(r, "readings", sensed.len()));
             Ok(Arc::new(Record {
                 input: rows(&i, "input", n_axes)?,
                 target: rows(&t, "target", n_axes)?,
                 certainty: certainty.transpose()?,
-                joint: joint.transpose()?,
+                sensed: read.transpose()?.unwrap_or_default(),
                 own: values(number),
                 start,
                 lead,
@@ -181,7 +183,7 @@ impl SimulatedLogs {
             input: simulation_input(input)?,
             output: simulation_output(output)?,
             weighting: weightings(weighting),
-            joint_weighting: weightings(joint_weighting),
+            sensed: sensed.clone(),
             method: integrator.map_or(Ok(each_sample), |i| i.method())?,
             block_s,
             courses: None,

@@ -2,7 +2,7 @@
 
 use crate::entry::{InputError, input_error};
 use axisight_core::robot::{Parameter, RobotDescription};
-use axisight_identification::logs::{FitOptions, FitParameter, Loss, Target};
+use axisight_identification::logs::{FitOptions, FitParameter, Loss, Sensed, SensedOutput, Target};
 use axisight_numerics::Weighting;
 use pyo3::prelude::*;
 
@@ -38,6 +38,28 @@ pub struct OptionSpec {
 
 /// Frequencies [Hz], weights and decimation of one axis.
 pub type WeightingTuple = (Vec<f64>, Vec<f64>, usize);
+
+/// Kind of a reading of a sensor on the arm, its index, and its weighting.
+pub type SensedTuple = (String, usize, WeightingTuple);
+
+/// Compared readings of sensors on the arm.
+pub fn sensed_outputs(specs: Vec<SensedTuple>) -> PyResult<Vec<SensedOutput>> {
+    let one = |(kind, index, weighting): SensedTuple| {
+        let quantity = match kind.as_str() {
+            "joint_angle" => Sensed::JointAngle(index),
+            "acceleration" => Sensed::SpecificForce(index),
+            other => {
+                let text = format!("sensed: expected joint_angle or acceleration, got {other}");
+                return Err(input_error(text));
+            }
+        };
+        Ok(SensedOutput {
+            quantity,
+            weighting: self::weighting(weighting),
+        })
+    };
+    specs.into_iter().map(one).collect()
+}
 
 /// Parameters of a fit. Raises `InputError` if `robot` does not have one of them.
 pub fn parameters(
@@ -104,12 +126,13 @@ pub fn options(spec: &OptionSpec) -> PyResult<FitOptions> {
 
 /// Weightings of errors, one per axis.
 pub fn weightings(specs: Vec<WeightingTuple>) -> Vec<Weighting> {
-    specs
-        .into_iter()
-        .map(|(frequency_hz, weight, decimation)| Weighting {
-            frequency_hz,
-            weight,
-            decimation,
-        })
-        .collect()
+    specs.into_iter().map(weighting).collect()
+}
+
+fn weighting((frequency_hz, weight, decimation): WeightingTuple) -> Weighting {
+    Weighting {
+        frequency_hz,
+        weight,
+        decimation,
+    }
 }

@@ -3,6 +3,7 @@
 // PyO3 passes owned values and names the lifetime of the interpreter.
 #![allow(clippy::needless_pass_by_value, clippy::elidable_lifetime_names)]
 
+mod accelerometers;
 mod axis_fit;
 mod convert;
 mod effects;
@@ -53,6 +54,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulation::check_integrator, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::simulate_batch, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::measurement_noise, module)?)?;
+    module.add_function(wrap_pyfunction!(accelerometers::accelerometers, module)?)?;
+    module.add_function(wrap_pyfunction!(accelerometers::specific_force, module)?)?;
+    module.add_function(wrap_pyfunction!(accelerometers::described_as, module)?)?;
     module.add_function(wrap_pyfunction!(plant::state_at_rest, module)?)?;
     module.add_function(wrap_pyfunction!(plant::state_rates, module)?)?;
     module.add_function(wrap_pyfunction!(fit::status_advice, module)?)?;

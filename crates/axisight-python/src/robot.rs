@@ -23,8 +23,8 @@ pub struct Robot {
     pub description: RobotDescription,
     body: RigidBody,
     source: String,
-    changes: Vec<(String, f64)>,
-    controller_speed: f64,
+    pub changes: Vec<(String, f64)>,
+    pub controller_speed: f64,
 }
 
 /// Pickled data of a robot: text, changed parameters, controller speed, effects, operating point,
@@ -144,7 +144,7 @@ impl Robot {
 
     /// Effects that the robot's own simulator includes.
     #[getter]
-    fn effects(&self) -> Vec<EffectTuple> {
+    pub fn effects(&self) -> Vec<EffectTuple> {
         self.description.effects.iter().map(tuple).collect()
     }
 
@@ -177,7 +177,7 @@ impl Robot {
 
     /// Whether a controller of positions uses the rate of its references as speed reference.
     #[getter]
-    fn velocity_feedforward(&self) -> bool {
+    pub fn velocity_feedforward(&self) -> bool {
         !matches!(
             self.description.controller,
             Controller::PdPosition {
@@ -243,7 +243,7 @@ impl Robot {
 
     /// Rebuild a robot from its pickled data.
     #[staticmethod]
-    fn _restore(
+    pub(crate) fn _restore(
         text: String,
         changes: Vec<(String, f64)>,
         controller_speed: f64,

@@ -4,6 +4,7 @@ use crate::convert::{array2, array3, planes};
 use crate::effects::{EffectTuple, settings};
 use crate::entry::{CancelToken, detached, flag, input_error};
 use crate::robot::Robot;
+use axisight_core::robot::n_readings;
 use axisight_core::simulation::{
     self, Batch, BatchError, BatchInput, Effort, Method, Model, Outcome, Status, Traces,
 };
@@ -208,8 +209,9 @@ fn counters(effort: Effort) -> [(&'static str, u64); 6] {
 }
 
 /// Signals by name, with their columns.
-fn signals(traces: Traces, robot: &Robot) -> [(&'static str, Vec<f64>, usize); 6] {
+fn signals(traces: Traces, robot: &Robot) -> [(&'static str, Vec<f64>, usize); 7] {
     let (n_axes, n_joints) = (robot.description.n_axes(), robot.description.n_joints());
+    let n_readings = n_readings(&robot.description.accelerometers);
     [
         ("torque_cmd_nm", traces.command, n_axes),
         ("position_rad", traces.measured, n_axes),
@@ -221,6 +223,7 @@ fn signals(traces: Traces, robot: &Robot) -> [(&'static str, Vec<f64>, usize); 6
             traces.position_disturbance,
             n_axes,
         ),
+        ("acceleration_m_s2", traces.specific_force, n_readings),
     ]
 }
 
@@ -239,7 +242,7 @@ fn many<'py>(
         out.set_item(name, counts)?;
     }
     let n_samples = traces.n_samples;
-    for (name, data, columns) in signals(traces, robot) {
+    for (name, data, columns) in signals(traces, robot).into_iter().filter(|s| s.2 > 0) {
         out.set_item(name, array3(py, data, n_samples, columns)?)?;
     }
     Ok(out)

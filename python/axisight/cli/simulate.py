@@ -245,4 +245,10 @@ def _log_table(result: xr.Dataset, inputs: dict[str, NDArray[np.float64]]) -> pd
             data[f"velocity_ref_{i + 1}"] = reference[: result.sizes["time"], i]
         data[f"torque_cmd_{i + 1}"] = result["torque_cmd_nm"].values[:, i]
         data[f"position_{i + 1}"] = result["position_rad"].values[:, i]
+    if "acceleration_m_s2" in result:
+        for place in result["accelerometer"].values:
+            for direction in result["direction"].values:
+                found = result["acceleration_m_s2"].sel(accelerometer=place, direction=direction)
+                if found.notnull().any():
+                    data[f"acceleration_{place}_{direction}"] = found.values
     return pd.DataFrame(data)

@@ -18,6 +18,7 @@ from axisight.errors import InputError
 from axisight.fitting.divergence import Diverged
 from axisight.fitting.loads import with_loads
 from axisight.fitting.parameters import Parameter, core_spec, with_search
+from axisight.fitting.sensed import accelerations, core_readings, joint_angles
 from axisight.fitting.weighting import Weighting
 from axisight.logs import Log
 from axisight.robot import Robot
@@ -111,6 +112,7 @@ def fit(
     effects: Iterable[Effect] = (),
     weighting: Weighting | None = None,
     joint_weighting: Weighting | None = None,
+    acceleration_weighting: Weighting | None = None,
     options: FitOptions | None = None,
 ) -> Fitted:
     """Fit parameters to several logs together, and return values with standard errors.
@@ -122,6 +124,10 @@ def fit(
     With a ``joint_weighting`` (weights in 1/rad), the fit also compares the angles of the driven joints with
     ``joint_position_rad`` of the logs. The zero of a joint encoder does not matter: its mean error over a log
     is removed. Axes without an encoder (NaN) and logs without any are not compared.
+
+    With an ``acceleration_weighting`` (weights in s^2/m, a row for each reading of `Robot.accelerometers`), the
+    fit also compares ``acceleration_m_s2`` of the logs. The mean error of each reading over a log is removed, so
+    that its bias does not matter. Readings that a log lacks are not compared.
 
     A log may state its load (``load``). It replaces the robot's own effect ``payload`` in that log only.
 
@@ -137,6 +143,7 @@ def fit(
         added,
         weighting=weighting,
         joint_weighting=joint_weighting,
+        acceleration_weighting=acceleration_weighting,
         options=chosen,
     )
     specs = [core_spec(with_search(p), added) for p in parameters]
@@ -156,6 +163,7 @@ def simulated_logs(
     *,
     weighting: Weighting | None = None,
     joint_weighting: Weighting | None = None,
+    acceleration_weighting: Weighting | None = None,
     options: FitOptions,
 ) -> tuple[_core.SimulatedLogs, list[Effect]]:
     """Return the logs ready for fits, and ``effects`` with a payload if logs state their load.
@@ -164,40 +172,24 @@ def simulated_logs(
     """
     closed = is_closed_loop(robot, logs)
     every, own = with_loads(robot, effects, [log.load for log in logs])
-    joints = None if joint_weighting is None else joint_angles(logs)
+    sensed = []
+    if joint_weighting is not None:
+        sensed.append(joint_angles(logs, joint_weighting))
+    if acceleration_weighting is not None:
+        sensed.append(accelerations(robot, logs, acceleration_weighting))
     ready = _core.SimulatedLogs(
         robot.core,
         records(logs, closed=closed),
         (weighting or Weighting.flat(robot.n_axes)).core(),
         input="reference" if closed else "torque",
         output="torque" if closed else "position",
-        joint=joints or [],
-        joint_weighting=[] if joint_weighting is None else joint_weighting.core(),
+        sensed=[output for one in sensed for output in one.core()],
+        readings=core_readings(sensed, logs),
         own=own,
         block_s=options.block_s,
         integrator=options.integrator,
     )
     return ready, every
-
-
-def joint_angles(logs: Sequence[Log]) -> list[Array | None]:
-    """Return the joint encoders of each log (lead + n, n_axes) [rad], None for a log without one.
-
-    Raises InputError if no log has a joint encoder.
-    """
-    if all(log.joint_position_rad is None for log in logs):
-        raise InputError(
-            "joint_weighting: expected logs with joint_position_rad (columns joint_position_N), got none"
-        )
-    out: list[Array | None] = []
-    for log in logs:
-        angles = log.joint_position_rad
-        if angles is not None:
-            # Samples of the run-up are not compared.
-            before = np.zeros((log.lead, log.n_axes))
-            angles = np.ascontiguousarray(np.concatenate([before, angles]))
-        out.append(angles)
-    return out
 
 
 def is_closed_loop(robot: Robot, logs: Sequence[Log]) -> bool:

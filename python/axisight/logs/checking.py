@@ -101,6 +101,7 @@ def check_log(
     why = "not a native column, not used" if found.pattern is None else "not used by the map"
     findings += [Finding("ok", short(name, 200), why) for name in found.unused]
     findings += look_at_signals(found.signals, found.labels, _prismatic(found))
+    findings += _look_at_accelerations(found)
     sound = all(finding.severity != "error" for finding in findings)
     if sound and rate is not None and grid.stamps_s is None:
         findings += check_rows(found.signals, found.labels, 1.0 / rate)
@@ -161,6 +162,17 @@ def look_at_signals(
         finite = values[np.isfinite(values)]  # gaps and NaN are reported separately
         if finite.size:
             findings += check_signal(field, labels[channel], finite, unit, axis + 1)
+    return findings
+
+
+def _look_at_accelerations(found: Gathered) -> list[Finding]:
+    """Return findings about each reading of an accelerometer on its own: constant, quantized."""
+    findings = []
+    for place, values in found.accelerations.items():
+        finite = values[np.isfinite(values)]
+        if finite.size:
+            label = found.reading_labels[place]
+            findings += check_signal("acceleration", label, finite, "m/s^2")
     return findings
 
 

@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from axisight.arguments import did_you_mean, short, shown
 from axisight.logs.units import (
     PRISMATIC_UNITS,
     REVOLUTE_UNITS,
+    AccelerationUnit,
     PositionUnit,
     TemperatureUnit,
     TimeUnit,
@@ -187,6 +188,46 @@ class TemperatureColumn(_Signal):
     unit: TemperatureUnit = "degC"
 
 
+class AccelerationColumn(_Signal):
+    """A direction of an accelerometer: the acceleration minus gravity, in m/s^2, mm/s^2 or g."""
+
+    unit: AccelerationUnit
+
+
+class AccelerometerColumns(_Strict):
+    """The measured directions of an accelerometer; `name` is that of the robot's `[[accelerometer]]`."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+    x: AccelerationColumn | None = None
+    y: AccelerationColumn | None = None
+    z: AccelerationColumn | None = None
+
+    @property
+    def readings(self) -> dict[str, AccelerationColumn]:
+        """The columns of the measured directions, by direction."""
+        columns = {"x": self.x, "y": self.y, "z": self.z}
+        return {direction: c for direction, c in columns.items() if c is not None}
+
+    @model_validator(mode="after")
+    def _some(self) -> AccelerometerColumns:
+        if not self.readings:
+            raise ValueError("expected a column x, y or z, got none")
+        return self
+
+
+def _different(
+    accelerometers: tuple[AccelerometerColumns, ...],
+) -> tuple[AccelerometerColumns, ...]:
+    names = [one.name for one in accelerometers]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ValueError(f"expected different names, got {twice!r} twice")
+    return accelerometers
+
+
+Accelerometers = Annotated[tuple[AccelerometerColumns, ...], AfterValidator(_different)]
+
+
 class AxisColumns(_Strict):
     """The signals of one driven axis.
 
@@ -246,6 +287,7 @@ class ColumnMap(_Strict):
     side: Literal["motor", "joint"] = "motor"
     time: TimeColumn | None = None
     axis: Annotated[tuple[AxisColumns, ...], Field(min_length=1)]
+    accelerometer: Accelerometers = ()
     csv: CsvOptions = CsvOptions()
 
     @model_validator(mode="after")

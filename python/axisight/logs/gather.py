@@ -38,22 +38,27 @@ _TIME_COST = 4
 _ENOUGH = 2**62
 Channel = tuple[str, int]
 """Field of an axis (`position`, `torque`, ...) and 0-based axis."""
+Reading = tuple[str, str]
+"""Name of an accelerometer and direction (`x`, `y` or `z`)."""
 
 
 @dataclass
 class Gathered:
     """The signals found, in SI units and 1-D, and findings about the others.
 
-    `doubts` concern whole files. A grid of more than `most_samples` would exceed the budget. `mapped`: the
-    caller gave a column map. `currents`: axes (from 0) whose torque was logged as a motor current; without a
-    robot it stays in A. `unknown`: those of these axes whose torque constant is unknown, with the constant of
-    the robot that converted them (Nm/A), or NaN if they are still in A.
+    `accelerations` are the readings of accelerometers (m/s^2), `reading_labels` their columns. `doubts` concern
+    whole files. A grid of more than `most_samples` would exceed the budget. `mapped`: the caller gave a column
+    map. `currents`: axes (from 0) whose torque was logged as a motor current; without a robot it stays in A.
+    `unknown`: those of these axes whose torque constant is unknown, with the constant of the robot that converted
+    them (Nm/A), or NaN if they are still in A.
     """
 
     path: Path
     columns: ColumnMap
     signals: dict[Channel, Floats] = field(default_factory=dict)
     labels: dict[Channel, str] = field(default_factory=dict)
+    accelerations: dict[Reading, Floats] = field(default_factory=dict)
+    reading_labels: dict[Reading, str] = field(default_factory=dict)
     time_s: Floats | None = None
     rate_hz: float | None = None
     findings: list[Finding] = field(default_factory=list)
@@ -68,11 +73,16 @@ class Gathered:
     @property
     def notes(self) -> list[str]:
         """The notes of the map on its signals, without repetition."""
-        signals = [getattr(axis, name) for axis in self.columns.axis for name in _FIELDS]
-        addresses: list[Address | None] = [self.columns.time, *signals]
-        return list(
-            dict.fromkeys(a.note for a in addresses if a is not None and a.note is not None)
-        )
+        addresses = _addresses(self.columns)
+        return list(dict.fromkeys(a.note for a in addresses if a.note is not None))
+
+    @property
+    def all_signals(self) -> dict[str, Floats]:
+        """All signals by the label of their columns: those of axes first, then those of accelerometers."""
+        of_axes = {self.labels[channel]: values for channel, values in self.signals.items()}
+        return of_axes | {
+            self.reading_labels[place]: values for place, values in self.accelerations.items()
+        }
 
 
 def gather(
@@ -117,7 +127,11 @@ def _gathered(files: _Files, path: Path, given: AnyMap | None, robot: Robot | No
         for name in _FIELDS:
             signal = getattr(axis, name)
             if signal is not None:
-                _take_signal(files, result, (name, number), signal)
+                result.labels[name, number] = signal.label
+                values = _signal(files, result, signal)
+                if values is not None:
+                    result.signals[name, number] = values
+    _take_accelerations(files, result)
     empty = _leave_empty_torques(result)
     _to_torques(result, robot)
     if result.time_s is None:
@@ -128,7 +142,9 @@ def _gathered(files: _Files, path: Path, given: AnyMap | None, robot: Robot | No
         result.unused = tuple(sorted(set(files.main) - _used_names(result.columns)))
     result.doubts = (*files.doubts(), *empty)
     result.findings += [Finding("warning", "file", doubt) for doubt in result.doubts]
-    result.most_samples = budget.limit // (8 * (len(result.signals) + 1))
+    result.most_samples = budget.limit // (
+        8 * (len(result.signals) + len(result.accelerations) + 1)
+    )
     return result
 
 
@@ -164,8 +180,14 @@ def _count_time(result: Gathered, budget: Budget) -> None:
 
 
 def _used_names(columns: ColumnMap) -> set[str]:
+    return {address.name for address in _addresses(columns)}
+
+
+def _addresses(columns: ColumnMap) -> list[Address]:
+    """Return the places of the time and of all signals."""
     signals = [getattr(axis, name) for axis in columns.axis for name in _FIELDS]
-    return {a.name for a in (columns.time, *signals) if a is not None}
+    readings = [a for sensor in columns.accelerometer for a in sensor.readings.values()]
+    return [a for a in (columns.time, *signals, *readings) if a is not None]
 
 
 def _usual_map(arrays: LazyArrays, robot: Robot | None, path: Path) -> AnyMap:
@@ -278,22 +300,31 @@ def _take_time(files: _Files, result: Gathered) -> None:
         result.findings.append(Finding("error", "sample_rate_hz", str(error)))
 
 
-def _take_signal(files: _Files, result: Gathered, channel: Channel, signal: Any) -> None:
-    result.labels[channel] = signal.label
+def _take_accelerations(files: _Files, result: Gathered) -> None:
+    for sensor in result.columns.accelerometer:
+        for direction, signal in sensor.readings.items():
+            result.reading_labels[sensor.name, direction] = signal.label
+            values = _signal(files, result, signal)
+            if values is not None:
+                result.accelerations[sensor.name, direction] = values
+
+
+def _signal(files: _Files, result: Gathered, signal: Any) -> Floats | None:
+    """Return a signal in SI units; None, with a finding, if it cannot be read."""
     try:
         arrays = files.of(signal)
         values = _numbers(_vector(arrays, signal, files.budget))
         scale, offset = (_scalar(arrays, value) for value in signal.line)
     except LogError as error:
         result.findings.append(Finding("error", signal.label, str(error)))
-        return
+        return None
     factor = signal.sign * scale * si_factor(signal.unit, signal.counts_per_rev)
     # In place: the log may have used all of its budget already.
     with np.errstate(over="ignore", invalid="ignore"):  # check_finite reports values that overflow
         values -= offset
         values *= factor
         values += si_offset(signal.unit)
-    result.signals[channel] = values
+    return values
 
 
 def _vector(arrays: Mapping[str, NDArray[Any]], address: Address, budget: Budget) -> NDArray[Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from axisight.logs.recorded import RecordedRows
 
 Floats = NDArray[np.float64]
+DIRECTIONS = ("x", "y", "z")
+"""Directions of an accelerometer, in the order of its columns."""
 AxisKind = Literal["revolute", "prismatic"]
 
 RESAMPLED = "resampled linearly"
@@ -55,6 +58,8 @@ class Log:
     array has shape (n, axes): motor-side `position_rad` (rad), `torque_nm` (Nm; all NaN if it was not
     logged), `position_ref_rad` (rad, targets of the position), `velocity_ref_rad_s` and
     `velocity_rad_s` (rad/s), joint-side `joint_position_rad` (rad) and `temperature_c` (degC).
+    `acceleration_m_s2` holds the readings (n, 3) [m/s^2] of each accelerometer by its name, along its directions
+    x, y and z: acceleration minus gravity, NaN where none is measured.
     Optional arrays are None when the log has none of them; a measured optional array holds NaN in
     the columns of axes without that sensor. On an axis whose `axis_kinds` entry is "prismatic", rad
     reads m and Nm reads N.
@@ -85,6 +90,7 @@ class Log:
     velocity_rad_s: Floats | None = None
     joint_position_rad: Floats | None = None
     temperature_c: Floats | None = None
+    acceleration_m_s2: Mapping[str, Floats] = dataclasses.field(default_factory=dict)
     start_rad: Floats | None = None
     run_up: RunUp | None = None
     excitation: str | None = None
@@ -108,6 +114,12 @@ class Log:
             values = getattr(self, field)
             if values is not None and values.shape != shape:
                 raise InputError(f"{field}: expected shape {shape}, got {values.shape}")
+        for name, readings in self.acceleration_m_s2.items():
+            if readings.shape != (shape[0], len(DIRECTIONS)):
+                raise InputError(
+                    f"acceleration_m_s2[{name!r}]: expected shape {(shape[0], len(DIRECTIONS))}, got "
+                    f"{readings.shape}"
+                )
         if self.start_rad is not None and self.start_rad.shape != shape[1:]:
             raise InputError(f"start_rad: expected shape {shape[1:]}, got {self.start_rad.shape}")
         if self.run_up is not None and self.run_up.position_rad.shape[1:] != shape[1:]:
@@ -156,7 +168,18 @@ class Log:
                     unit = self._unit(field, i)
                     span = map(html.number, (there.min(), there.max()))
                     rows.append((name, str(i + 1), unit, *span))
+        for name, x in self._readings():
+            rows.append((name, "", "m/s^2", *map(html.number, (np.nanmin(x), np.nanmax(x)))))
         return rows
+
+    def _readings(self) -> list[tuple[str, Floats]]:
+        """Return name and values (n,) of every reading of an accelerometer that was logged."""
+        return [
+            (f"acceleration_{name}_{direction}", readings[:, i])
+            for name, readings in self.acceleration_m_s2.items()
+            for i, direction in enumerate(DIRECTIONS)
+            if np.isfinite(readings[:, i]).any()
+        ]
 
     def _unit(self, field: str, axis: int) -> str:
         """Return the unit of a field on an axis (from 0)."""
@@ -239,6 +262,7 @@ class Log:
         kept: dict[str, Any] = {
             name: None if x is None else x[first:last] for name, x in arrays.items()
         }
+        kept["acceleration_m_s2"] = {n: x[first:last] for n, x in self.acceleration_m_s2.items()}
         periodic = self.period_s is not None and self.period_s <= seconds * (1 + 1e-9)
         note = f"from {first * self.sample_time_s:g} s to {last * self.sample_time_s:g} s"
         return dataclasses.replace(
@@ -257,7 +281,7 @@ class Log:
 
         If units differ between axes, `units` lists one unit per axis.
         """
-        variables = {}
+        variables: dict[str, tuple[str | tuple[str, str], Floats, dict[str, str]]] = {}
         for field, (name, _, _) in _VARIABLES.items():
             values = getattr(self, field)
             if values is None:
@@ -265,6 +289,8 @@ class Log:
             per_axis = [self._unit(field, axis) for axis in range(self.n_axes)]
             units = per_axis[0] if len(set(per_axis)) == 1 else ", ".join(per_axis)
             variables[name] = (("time", "axis"), values, {"units": units})
+        for name, readings in self._readings():
+            variables[name] = ("time", readings, {"units": "m/s^2"})
         attrs: dict[str, object] = {
             "name": self.name,
             "source": self.source.name,

@@ -20,6 +20,8 @@ NATIVE_STEMS = {
     "joint_position": ("joint_position", "rad"),
     "temperature": ("temperature_c", "degC"),
 }
+# Sensor and direction of a column of an accelerometer.
+ACCELERATION = re.compile(r"^acceleration_([A-Za-z][A-Za-z0-9_]*)_([xyz])$")
 # A message lists at most this many columns with other names.
 _SHOWN = 12
 _PATTERN = re.compile(
@@ -66,4 +68,21 @@ def native_map(names: Iterable[str], where: str) -> ColumnMap:
             if field in required or name in present:
                 axis[field] = {"name": name, "unit": unit}
         axes.append(axis)
-    return ColumnMap.model_validate({"time": {"name": "time_s", "unit": "s"}, "axis": axes})
+    return ColumnMap.model_validate(
+        {
+            "time": {"name": "time_s", "unit": "s"},
+            "axis": axes,
+            "accelerometer": _accelerometers(present),
+        }
+    )
+
+
+def _accelerometers(names: Iterable[str]) -> list[dict[str, Any]]:
+    """Return the accelerometers whose native columns are among ``names``, by name."""
+    found: dict[str, dict[str, Any]] = {}
+    for column in sorted(names):
+        match = ACCELERATION.match(column)
+        if match is not None:
+            sensor = found.setdefault(match[1], {"name": match[1]})
+            sensor[match[2]] = {"name": column, "unit": "m/s^2"}
+    return list(found.values())

@@ -12,6 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 from axisight.arguments import short
 from axisight.errors import LogError
 from axisight.logs.columns import (
+    Accelerometers,
     Address,
     ColumnMap,
     CsvOptions,
@@ -85,6 +86,7 @@ class ColumnPattern(_Strict):
     axes: Annotated[int, Field(ge=1, le=1000)] | None = None
     time: Annotated[tuple[TimeColumn, ...], BeforeValidator(_listed)] = ()
     every_axis: AxisPattern
+    accelerometer: Accelerometers = ()
     csv: CsvOptions = CsvOptions()
 
     @model_validator(mode="after")
@@ -123,6 +125,7 @@ class ColumnPattern(_Strict):
                 "side": self.side,
                 "time": times[0] if times else None,
                 "axis": axes,
+                "accelerometer": self.accelerometer,
                 "csv": self.csv,
             }
         )

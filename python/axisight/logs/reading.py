@@ -12,7 +12,7 @@ from axisight.logs.columns import UNKNOWN
 from axisight.logs.findings import raise_errors
 from axisight.logs.gather import Gathered, gather
 from axisight.logs.grid import Grid, make_grid
-from axisight.logs.log import Floats, Log, not_logged
+from axisight.logs.log import DIRECTIONS, Floats, Log, not_logged
 from axisight.logs.map_files import AnyMap
 from axisight.logs.recorded import recorded_rows
 from axisight.logs.sources import log_name
@@ -107,7 +107,7 @@ def grid_of(found: Gathered) -> Grid:
     time = found.columns.time
     resample = time.resample_hz if time is not None else None
     assert resample != "mean"  # `gather` has replaced it by the rate
-    n_samples = max((values.size for values in found.signals.values()), default=0)
+    n_samples = max((values.size for values in found.all_signals.values()), default=0)
     return make_grid(
         found.time_s,
         found.rate_hz,
@@ -146,6 +146,7 @@ def _assemble(found: Gathered, grid: Grid) -> Log:
         velocity_rad_s=matrix("velocity"),
         joint_position_rad=matrix("joint_position"),
         temperature_c=matrix("temperature"),
+        acceleration_m_s2=_accelerations(found, grid, time_s),
         axis_kinds=tuple(
             "prismatic" if axis.prismatic else "revolute" for axis in found.columns.axis
         ),
@@ -155,6 +156,15 @@ def _assemble(found: Gathered, grid: Grid) -> Log:
         if grid.stamps_s is None
         else recorded_rows(grid.stamps_s, found.signals, found.labels),
     )
+
+
+def _accelerations(found: Gathered, grid: Grid, time_s: Floats) -> dict[str, Floats]:
+    """Return the value of `Log.acceleration_m_s2`."""
+    out: dict[str, Floats] = {}
+    for (sensor, direction), values in found.accelerations.items():
+        readings = out.setdefault(sensor, np.full((grid.n_samples, len(DIRECTIONS)), np.nan))
+        readings[:, DIRECTIONS.index(direction)] = _on_grid(values, grid, time_s)
+    return out
 
 
 def _nominal(found: Gathered) -> tuple[float | None, ...]:

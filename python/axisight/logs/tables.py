@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 import xarray as xr
@@ -21,8 +21,9 @@ from axisight.logs.columns import ColumnMap, as_unit, describe_validation
 from axisight.logs.gather import gather_arrays
 from axisight.logs.log import Log
 from axisight.logs.map_files import AnyMap, load_column_map
+from axisight.logs.native import ACCELERATION
 from axisight.logs.reading import log_of
-from axisight.logs.units import PRISMATIC_UNITS, REVOLUTE_UNITS
+from axisight.logs.units import PRISMATIC_UNITS, REVOLUTE_UNITS, AccelerationUnit
 from axisight.robot.axis_names import axis_number
 
 if TYPE_CHECKING:
@@ -84,12 +85,16 @@ class _Column:
 
 @dataclass
 class _Found:
-    """The recognized columns: (name, unit) by field and axis (from 0) and of the time; other names."""
+    """The recognized columns: (name, unit) by field and axis (from 0) and of the time; other names.
+
+    ``accelerometers`` are tables of a column map, by name.
+    """
 
     signals: dict[tuple[str, int], tuple[str, str]]
     arrays: dict[str, NDArray[Any]]
     time: tuple[str, str] | None
     others: list[str]
+    accelerometers: dict[str, dict[str, Any]]
 
 
 def is_table(value: object) -> bool:
@@ -113,7 +118,8 @@ def log_of_table(
         `to_pandas` (polars, pyarrow). Signals are (n,) each, or (n, axes) in a Dataset or mapping.
     columns : a column map or its path, as in `read_log`. Without one, signals are found by name:
         `position_1`, `torque_cmd_1` (or `torque_1`), `position_ref_1`, `velocity_ref_1`,
-        `velocity_1`, `joint_position_1`, `temperature_1`, and `time_s` (or the index). The number
+        `velocity_1`, `joint_position_1`, `temperature_1`, `acceleration_NAME_x` of the accelerometer
+        NAME, and `time_s` (or the index). The number
         may be a joint name of the robot, and is left out where an array has all axes. A unit may
         follow: `position_deg_1`, `velocity_rpm_1`, `torque_nm_1`, `time_ms`. The attribute `units`
         of a Dataset counts first; without any unit, signals are in rad, rad/s, Nm, degC and s, on
@@ -204,7 +210,7 @@ def _of_dataset(table: xr.Dataset) -> Iterator[_Column]:
 def _found(columns: Sequence[_Column], name: str, robot: Robot | None) -> _Found:
     """Return the columns by the meaning of their names; raise LogError for two columns of one meaning."""
     joints = [] if robot is None else robot.axis_names
-    found = _Found({}, {}, None, [])
+    found = _Found({}, {}, None, [], {})
     pattern = _pattern(joints)
     for column in columns:
         time = _TIMES.fullmatch(column.name)
@@ -219,6 +225,10 @@ def _found(columns: Sequence[_Column], name: str, robot: Robot | None) -> _Found
                 raise LogError(f"{name}: {_wrong_unit(column.name, _TIME_UNITS, units)}")
             found.time = (column.name, units or (time[1] or "s").lower())
             found.arrays[column.name] = column.values
+            continue
+        reading = ACCELERATION.match(column.name)
+        if reading is not None and column.values.ndim == 1:
+            _take_reading(found, column, reading, name)
             continue
         match = pattern.fullmatch(column.name)
         if match is None:
@@ -241,6 +251,16 @@ def _found(columns: Sequence[_Column], name: str, robot: Robot | None) -> _Found
             found.signals[field, k] = (entry, unit)
             found.arrays[entry] = values
     return found
+
+
+def _take_reading(found: _Found, column: _Column, match: re.Match[str], name: str) -> None:
+    """Add a reading of an accelerometer to the columns found; raise LogError for a wrong unit."""
+    unit = column.units.strip() or "m/s^2"
+    if unit not in get_args(AccelerationUnit):
+        raise LogError(f"{name}: {_wrong_unit(column.name, get_args(AccelerationUnit), unit)}")
+    sensor = found.accelerometers.setdefault(match[1], {"name": match[1]})
+    sensor[match[2]] = {"name": column.name, "unit": unit}
+    found.arrays[column.name] = column.values
 
 
 def _pattern(joints: Sequence[str]) -> re.Pattern[str]:
@@ -372,7 +392,7 @@ def _map_of(found: _Found, name: str, step: float | None, robot: Robot | None) -
     axes: list[dict[str, Any]] = [{} for _ in range(n)]
     for (field, k), (entry, unit) in found.signals.items():
         axes[k][field] = {"name": entry, "unit": unit}
-    given: dict[str, Any] = {"axis": axes}
+    given: dict[str, Any] = {"axis": axes, "accelerometer": list(found.accelerometers.values())}
     if found.time is not None:
         given["time"] = dict(zip(("name", "unit"), found.time, strict=True))
     elif step is not None:

@@ -11,6 +11,7 @@ TimeUnit = Literal["s", "ms", "us", "ns"]
 PositionUnit = Literal["rad", "deg", "rev", "counts", "m", "mm"]
 VelocityUnit = Literal["rad/s", "deg/s", "rpm", "rev/s", "counts/s", "m/s", "mm/s"]
 TorqueUnit = Literal["Nm", "N", "A", "V"]
+AccelerationUnit = Literal["m/s^2", "mm/s^2", "g"]
 TemperatureUnit = Literal["degC", "K"]
 
 POSITION_UNITS = ("rad", "deg", "rev", "m", "mm")
@@ -39,6 +40,9 @@ _FACTORS = {
     "rev/s": _TURN,
     "m/s": 1.0,
     "mm/s": 1e-3,
+    "m/s^2": 1.0,
+    "mm/s^2": 1e-3,
+    "g": 9.80665,  # standard gravity
     "Nm": 1.0,
     "N": 1.0,
     "A": 1.0,  # the map's scale carries Nm/A or N/A
@@ -49,7 +53,7 @@ _FACTORS = {
 
 
 def si_factor(unit: str, counts_per_rev: float | None = None) -> float:
-    """Return the factor that turns a value in `unit` into SI (rad, m, rad/s, m/s, s, Nm, N).
+    """Return the factor that turns a value in `unit` into SI (rad, m, rad/s, m/s, m/s^2, s, Nm, N).
 
     Raises LogError for an unknown unit, or for counts without `counts_per_rev`.
     """

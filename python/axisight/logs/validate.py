@@ -72,7 +72,7 @@ def _partly(found: Gathered, field: str, words: str, name: str) -> list[Finding]
 
 def check_lengths(found: Gathered) -> list[Finding]:
     """Return a finding for each signal whose length differs from that of the time, or of the first signal."""
-    lengths = {found.labels[channel]: values.size for channel, values in found.signals.items()}
+    lengths = {label: values.size for label, values in found.all_signals.items()}
     if found.time_s is not None and found.columns.time is not None:
         lengths = {found.columns.time.label: found.time_s.size, **lengths}
     if not lengths:
@@ -90,13 +90,15 @@ def check_finite(found: Gathered) -> list[Finding]:
     findings = []
     for channel, values in found.signals.items():
         findings += not_finite(values, found.labels[channel], channel[1] + 1, found.time_s)
+    for place, values in found.accelerations.items():
+        findings += not_finite(values, found.reading_labels[place], None, found.time_s)
     return findings
 
 
 def not_finite(
-    values: Floats, label: str, axis: int, time_s: Floats | None = None
+    values: Floats, label: str, axis: int | None, time_s: Floats | None = None
 ) -> list[Finding]:
-    """Return a finding if `values` (n,) of an `axis` (from 1) hold NaN or infinities.
+    """Return a finding if `values` (n,), of an `axis` (from 1) unless None, hold NaN or infinities.
 
     `time_s` (n,) (s), if known, adds the time of the first one.
     """

@@ -1,7 +1,8 @@
 """Robots: reading descriptions and presets, kinematics, dynamics and linearization."""
 
+from axisight.robot.accelerometer import Accelerometer
 from axisight.robot.description import Drive, Joint, Link, Spring
 from axisight.robot.loading import load_robot
 from axisight.robot.robot import Robot
 
-__all__ = ["Drive", "Joint", "Link", "Robot", "Spring", "load_robot"]
+__all__ = ["Accelerometer", "Drive", "Joint", "Link", "Robot", "Spring", "load_robot"]

@@ -17,6 +17,12 @@ from axisight.arguments import did_you_mean, instance, positive
 from axisight.display import html
 from axisight.effects import Effect, core_effects, effect_of_core
 from axisight.errors import InputError
+from axisight.robot.accelerometer import (
+    Accelerometer,
+    accelerometer_of,
+    by_direction,
+    described_with,
+)
 from axisight.robot.axis_names import axis_number, effect_on
 from axisight.robot.description import Joint, joint_of
 
@@ -138,6 +144,11 @@ class Robot:
     def joints(self) -> tuple[Joint, ...]:
         """All joints with link, spring and drive, base to tip, at the current parameters."""
         return tuple(joint_of(entry) for entry in self.core.joints())
+
+    @property
+    def accelerometers(self) -> tuple[Accelerometer, ...]:
+        """The accelerometers on its links."""
+        return tuple(map(accelerometer_of, _core.accelerometers(self.core)))
 
     @property
     def gravity_m_s2(self) -> Array:
@@ -354,11 +365,15 @@ class Robot:
         text, found = _SAMPLE_TIME.subn(f"sample_time = {seconds!r}", self.core.toml, count=1)
         if not found:
             raise InputError(f"robot {self.name!r}: expected a line sample_time = ..., got none")
-        core = _core.Robot.from_toml(text).with_parameters(self.core.parameters())
-        core = core.with_operating_point(self.operating_point.tolist())
-        if core.velocity_feedforward != self.velocity_feedforward:
-            core = core.with_velocity_feedforward(self.velocity_feedforward)
-        return self._with_core(core.with_effects(core_effects(self.effects)))
+        return self._with_core(_core.described_as(self.core, text).with_controller_speed(1.0))
+
+    def with_accelerometers(self, accelerometers: Sequence[Accelerometer]) -> Robot:
+        """Return the same robot with ``accelerometers`` in place of all its own.
+
+        Raises RobotError for a name that comes twice and for a joint that the robot does not have.
+        """
+        text = described_with(self.core.toml, accelerometers)
+        return self._with_core(_core.described_as(self.core, text))
 
     def with_controller_speed(self, factor: float) -> Robot:
         """Return the same robot with a control loop ``factor`` [1] times as fast as stated.
@@ -453,6 +468,18 @@ class Robot:
         (rows, rates, forces), single = self._rows(q=q, v=v, tau=tau)
         out = self.core.forward_dynamics(rows, rates, forces)
         return out[0] if single else out
+
+    def specific_force(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Return what the accelerometers read along a motion of all joints [m/s^2].
+
+        Shape (n_accelerometers, 3) or (n, n_accelerometers, 3), NaN where no direction is measured. Arguments
+        and errors are those of `inverse_dynamics`.
+        """
+        (rows, rates, accelerations), single = self._rows(q=q, v=v, a=a)
+        out = _core.specific_force(self.core, rows, rates, accelerations)
+        # Without readings, the core cannot say how many rows there are.
+        by_place = by_direction(out.reshape(len(rows), out.shape[1]), self.accelerometers)
+        return by_place[0] if single else by_place
 
     def pose(self, q: ArrayLike, joint: int | str = -1) -> tuple[Array, Array]:
         """Return rotation (3, 3) and origin (3,) [m] of a link frame in the base frame.

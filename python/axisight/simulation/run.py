@@ -16,6 +16,7 @@ from axisight.arguments import one_of
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
 from axisight.robot import Robot
+from axisight.robot.accelerometer import DIRECTIONS, by_direction
 from axisight.simulation.inputs import given_noise, one_input, start_angles
 from axisight.simulation.integrator import Integrator, Method
 from axisight.simulation.noise import sensor_noise
@@ -66,7 +67,9 @@ def simulate(
     Dataset with dims (time, axis) and (time, joint): ``torque_cmd_nm``,
     ``position_rad`` (measured), ``motor_position_rad`` and
     ``joint_position_rad`` (true), ``torque_disturbance_nm``,
-    ``position_disturbance_rad``. ``attrs["status"]`` is ``completed``,
+    ``position_disturbance_rad``. A robot with accelerometers also has their readings
+    ``acceleration_m_s2`` (time, accelerometer, direction), without noise: acceleration minus gravity,
+    before the command of the sample acts. ``attrs["status"]`` is ``completed``,
     ``diverged`` or ``step_size_collapsed`` (an unstable loop ends as either of these two, and the
     arrays then end at the failed sample). Further attributes count steps and evaluations.
 
@@ -272,11 +275,29 @@ def _dataset(
     joint = (*dims, "joint"), out["joint_position_rad"][part], {"units": "rad"}
     n = joint[1].shape[-2]
     return xr.Dataset(
-        {**variables, "joint_position_rad": joint},
+        {**variables, "joint_position_rad": joint, **_accelerations(robot, out, dims, part)},
         coords={
             "time": ("time", np.arange(n) * robot.sample_time_s, {"units": "s"}),
             "axis": robot.axis_numbers(),
             "joint": robot.joint_names,
+            **_places(robot),
         },
         attrs={"robot": robot.name, **attrs, "axisight_version": _version()},
     )
+
+
+def _accelerations(
+    robot: Robot, out: _core.BatchOutput, dims: tuple[str, ...], part: tuple[int | slice, ...]
+) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:
+    """Return the readings of accelerometers as a variable; none without accelerometers."""
+    if "acceleration_m_s2" not in out:
+        return {}
+    readings = by_direction(out["acceleration_m_s2"][part], robot.accelerometers)
+    return {
+        "acceleration_m_s2": ((*dims, "accelerometer", "direction"), readings, {"units": "m/s^2"})
+    }
+
+
+def _places(robot: Robot) -> dict[str, list[str]]:
+    names = [one.name for one in robot.accelerometers]
+    return {"accelerometer": names, "direction": list(DIRECTIONS)} if names else {}

@@ -8,11 +8,12 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from axisight import FitOptions, Log
+from axisight import FitOptions, Log, read_log
 from axisight.cli import app
 from axisight.graybox.multiaxis import procedure
+from axisight.robot import Accelerometer
 from axisight.robot_file import load_identified
-from multiaxis_data import TRUTH, broadband, slow
+from multiaxis_data import ROBOT, TRUTH, broadband, slow
 
 GEARS = ("axis1.stiffness", "axis2.stiffness", "axis3.stiffness")
 
@@ -56,6 +57,27 @@ def test_logs_to_a_robot_file(files: list[Path], tmp_path: Path) -> None:
     assert sidecar["provenance"]["settings"]["parameters"] == list(GEARS)
     again, text = run("irb6600_like", *files[1:], *patterns, "-o", out)
     assert again == 2 and "--force" in text
+
+
+def test_accelerometers_from_the_simulation_to_the_robot_file(
+    files: list[Path], tmp_path: Path
+) -> None:
+    """The robot file states the sensor, `simulate` writes its columns, and step 3 compares them."""
+    arm, log, out = (tmp_path / name for name in ("arm.toml", "run.parquet", "found.toml"))
+    robot = ROBOT.with_accelerometers([Accelerometer("tip", "axis3_yaw", (1.2, 0.1, 0.2))])
+    arm.write_text(robot.toml, encoding="utf-8")
+    made = CliRunner().invoke(
+        app, ["simulate", str(arm), str(files[2]), "--noise-seed", "1", "--out", str(log)]
+    )
+    assert made.exit_code == 0, made.output
+    readings = read_log(log).acceleration_m_s2["tip"]
+    assert readings.shape[1] == 3 and abs(readings[0, 2] - 9.81) < 0.01
+    options = ["--parameters", "axis2.stiffness", "--no-coulomb", "--no-responses"]
+    status, text = run(arm, log, *options, "-o", out)
+    assert status == 0, text
+    assert "from motors and accelerometers" in text
+    assert load_identified(out).value("axis2.stiffness") == pytest.approx(3848000.0, rel=1e-3)
+    assert load_identified(out).robot.accelerometers == robot.accelerometers
 
 
 def test_a_search_that_does_not_end_has_status_one(files: list[Path], monkeypatch) -> None:

@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from axisight import Effect, InputError, Log
+from axisight import Effect, InputError, Log, simulate
 from axisight.graybox import RobotIdentification, identified_robot, identify_robot
 from axisight.graybox.multiaxis.operating_points import operating_points
 from axisight.graybox.multiaxis.starts import from_its_start
+from axisight.graybox.multiaxis.weightings import Sensors
 from axisight.logs import Load
+from axisight.robot import Accelerometer
 from axisight.robot_file import Provenance, write_identified
 from multiaxis_data import (
     POSES,
@@ -131,6 +133,43 @@ def test_logs_of_one_pose_and_load_make_a_response(logs: list[Log]) -> None:
     ]
     # Each pose is the mean of the motion, a tenth of a radian at most from its start.
     np.testing.assert_allclose(points[1].response.joint_angle_rad, POSES[1], atol=0.1)
+
+
+def test_accelerometers_take_part(logs: list[Log]) -> None:
+    """Readings with 0.01 m/s^2 of noise beside torques with 0.3 Nm."""
+    robot = ROBOT.with_accelerometers([Accelerometer("tip", "axis3_yaw", (1.2, 0.1, 0.2))])
+    rng = np.random.default_rng(4)
+    log = logs[1]
+    sim = simulate(robot, log.velocity_ref_rad_s, start_rad=list(POSES[0]), noise_seed=3, run=1)
+    tip = sim["acceleration_m_s2"].sel(accelerometer="tip").values
+    bare = replace(log, torque_nm=log.torque_nm + rng.normal(0, 0.3, log.torque_nm.shape))
+    sensed = replace(bare, acceleration_m_s2={"tip": tip + rng.normal(0, 0.01, tip.shape)})
+    names = ("axis2.stiffness", "axis2.damping", "axis3.stiffness")
+    start = robot.with_parameters({name: 1.3 * TRUTH[name] for name in names})
+    options = {"parameters": names, "responses": False, "coulomb": False}
+    found = identify_robot(start, [sensed], **options)
+    without = identify_robot(start, [bare], **options)
+    assert found.status in CONVERGED, found.findings
+    assert "in the time domain, from motors and accelerometers\n" in found.report()
+    assert without.joint.acceleration_weighting is None
+    fit = found.joint.fit
+    assert (np.abs(errors(fit.names, fit.values)) < 4 * fit.std / fit.values + 2e-4).all()
+    assert (fit.std < 0.5 * without.joint.fit.std).all()
+    with pytest.raises(InputError, match=r"\[\[accelerometer\]\] in the robot file"):
+        identify_robot(ROBOT, [sensed], **options)
+
+
+def test_a_reading_that_a_log_lacks_does_not_sharpen_the_others(logs: list[Log]) -> None:
+    """White residuals of one; two of three logs lack the last joint encoder, whose weight would be 1.7."""
+    rng = np.random.default_rng(0)
+    some = [replace(log, joint_position_rad=log.position_rad) for log in logs[:3]]
+    residuals = [rng.normal(size=(4000, 6)) for _ in some]
+    for residual in residuals[1:]:
+        residual[:, 5] = 0.0
+    _, joints, readings = Sensors.of(some).weightings(ROBOT, some, residuals)
+    assert joints is not None and readings is None
+    # Four times the scatter of bands of a thousand lines, as in test_fit_of_many.py.
+    np.testing.assert_allclose(joints.weight[:, -2:], 1.0, rtol=0.08)
 
 
 def test_misuse(logs: list[Log]) -> None:

@@ -199,6 +199,7 @@ pub fn trace<S: Scalar>(
         noise,
         resolution: 0.0,
         disturbances: true,
+        accelerometers: false,
         method,
         cancel: None,
     };

@@ -203,6 +203,7 @@ fn run_of<'a>(
         noise,
         resolution: 0.0,
         disturbances: true,
+        accelerometers: false,
         method: Method::default(),
         cancel: None,
     }

@@ -82,7 +82,7 @@ fn problem(input: SimulationInput) -> SimulationErrorProblem {
         input,
         output: SimulationOutput::Torque,
         weighting: vec![flat(1.0); 3],
-        joint_weighting: Vec::new(),
+        sensed: Vec::new(),
         method: METHOD,
         block_s: 0.05,
         courses: None,
@@ -303,7 +303,7 @@ fn courses_that_do_not_serve_are_left_alone() {
             .map(|n| Arc::new(Record::new(vec![0.0; n], vec![0.0; n])))
             .collect(),
         weighting: vec![flat(1.0)],
-        joint_weighting: Vec::new(),
+        sensed: Vec::new(),
         parameters: Vec::new(),
         effects: Vec::new(),
         robot: arm,
@@ -369,6 +369,7 @@ fn a_course_that_does_not_fit_a_run_is_refused() {
             noise: &[],
             resolution: 0.0,
             disturbances: false,
+            accelerometers: false,
             method,
             cancel: None,
         };

@@ -25,7 +25,7 @@ fn problem(effects: Vec<EffectSetting<f64>>, target: Target) -> SimulationErrorP
         input: SimulationInput::Torque,
         output: SimulationOutput::Position,
         weighting: vec![flat(1.0)],
-        joint_weighting: Vec::new(),
+        sensed: Vec::new(),
         method: Method::RungeKutta4 { substeps: 1 },
         block_s: 0.05,
         courses: None,

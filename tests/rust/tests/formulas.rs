@@ -486,6 +486,7 @@ fn through_plant(torque: &[f64], seeds: &[usize]) -> Vec<Dual<f64, 8>> {
         noise: &[],
         resolution: 0.0,
         disturbances: true,
+        accelerometers: false,
         method: Method::RungeKutta4 { substeps: 2 },
         cancel: None,
     };

@@ -72,6 +72,7 @@ fn linear_trace<S: Scalar>(
         noise,
         resolution: 0.0,
         disturbances: true,
+        accelerometers: false,
         method,
         cancel: None,
     };
@@ -328,6 +329,7 @@ fn samples_show_ripple_at_the_true_angle() {
         noise: &[&noise],
         resolution: 0.0,
         disturbances: true,
+        accelerometers: false,
         method: ONE,
         cancel: None,
     };
@@ -479,6 +481,7 @@ fn misuse_is_refused_by_name() {
         noise: &[],
         resolution: 0.0,
         disturbances: true,
+        accelerometers: false,
         method: ONE,
         cancel: Some(&flag),
     };

@@ -62,7 +62,7 @@ fn problem(robot: &RobotDescription, target: Vec<f64>) -> SimulationErrorProblem
         input: SimulationInput::Torque,
         output: SimulationOutput::Position,
         weighting: vec![flat(1.0)],
-        joint_weighting: Vec::new(),
+        sensed: Vec::new(),
         method: METHOD,
         block_s: 0.05,
         courses: None,

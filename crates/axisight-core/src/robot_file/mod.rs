@@ -1,5 +1,6 @@
 //! Robot files: reads a description from TOML text, and reports errors with their line.
 
+mod accelerometers;
 mod document;
 mod effects;
 mod error;

@@ -6,6 +6,7 @@
 //! The reader walks the document with spans, because a derived deserializer cannot report the line
 //! of a missing key.
 
+use super::accelerometers::read_accelerometers;
 use super::document::{Entry, Section, line_at, one_of};
 use super::effects::{read_effects, read_tolerances};
 use super::error::RobotError;
@@ -32,7 +33,7 @@ const ROOT_KEYS: &[&str] = &[
     "operating_point",
 ];
 /// Keys of version 2 only.
-const NEWER_ROOT_KEYS: &[&str] = &["effect", "tolerances"];
+const NEWER_ROOT_KEYS: &[&str] = &["accelerometer", "effect", "tolerances"];
 const JOINT_KEYS: &[&str] = &[
     "name",
     "kind",
@@ -85,6 +86,7 @@ pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
         controller: Controller::None,
         position_noise_std: 0.0,
         operating_point: Vec::new(),
+        accelerometers: Vec::new(),
         effects: Vec::new(),
         tolerances: Vec::new(),
     };
@@ -93,6 +95,7 @@ pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
     robot.controller = read_controller(&root, &robot, version)?;
     robot.position_noise_std = read_noise(&root)?;
     robot.operating_point = read_operating_point(&root, n_axes)?;
+    robot.accelerometers = read_accelerometers(&root, &robot)?;
     robot.effects = read_effects(&root, &robot)?;
     robot.tolerances = read_tolerances(&root, &robot)?;
     Ok(robot)

@@ -9,7 +9,7 @@
 
 use super::linear::{LinearPlant, LinearPlantError, simulate_linear};
 use crate::plant::{Plant, PlantError, assemble, stepper};
-use crate::robot::{EffectSetting, RobotDescription};
+use crate::robot::{EffectSetting, RobotDescription, n_readings};
 use axisight_plant::simulation::{
     Drive, Effort, Method, Run, Sample, SimulationError, Status, Stepper, simulate,
 };
@@ -89,6 +89,52 @@ pub struct Traces {
     pub torque_disturbance: Vec<f64>,
     /// Error of the measured positions [rad], per axis.
     pub position_disturbance: Vec<f64>,
+    /// Readings of the accelerometers [m/s^2], per direction.
+    pub specific_force: Vec<f64>,
+}
+
+impl Traces {
+    fn zeros(robot: &RobotDescription, n_runs: usize, n_samples: usize) -> Self {
+        let (n_axes, n_joints) = (robot.n_axes().max(1), robot.n_joints().max(1));
+        let zeros = |columns: usize| vec![0.0; n_runs * n_samples * columns];
+        Self {
+            n_samples,
+            command: zeros(n_axes),
+            measured: zeros(n_axes),
+            motor: zeros(n_axes),
+            joint: zeros(n_joints),
+            torque_disturbance: zeros(n_axes),
+            position_disturbance: zeros(n_axes),
+            specific_force: zeros(n_readings(&robot.accelerometers)),
+        }
+    }
+
+    /// The runs in groups of `width`, each with its part of every signal; none without samples.
+    fn groups(&mut self, n_runs: usize, width: usize) -> Vec<Group<'_>> {
+        let n_samples = self.n_samples;
+        let mut parts = [
+            &mut self.command,
+            &mut self.measured,
+            &mut self.motor,
+            &mut self.joint,
+            &mut self.torque_disturbance,
+            &mut self.position_disturbance,
+            &mut self.specific_force,
+        ]
+        .map(|signal| {
+            // Chunks of length zero panic. A signal without columns has no chunks.
+            let each = (signal.len() / n_runs.max(1) * width).max(1);
+            signal.chunks_mut(each)
+        });
+        let starts = (0..n_runs).step_by(width).filter(|_| n_samples > 0);
+        starts
+            .map(|first| Group {
+                runs: (first..(first + width).min(n_runs)).collect(),
+                n_samples,
+                signals: parts.each_mut().map(|part| part.next().unwrap_or_default()),
+            })
+            .collect()
+    }
 }
 
 /// Status and effort of a run.
@@ -128,7 +174,7 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
         Model::Nonlinear => None,
     };
     let runs = batch.input.runs();
-    let (n_axes, n_joints) = (batch.robot.n_axes().max(1), batch.robot.n_joints().max(1));
+    let n_axes = batch.robot.n_axes().max(1);
     let n_samples = runs.first().map_or(0, |r| r.len() / n_axes);
     if let Some(i) = runs.iter().position(|r| r.len() != n_samples * n_axes) {
         let expected = format!("{n_samples} samples in every run");
@@ -153,36 +199,8 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
         }
         .into());
     }
-    let size = n_samples * n_axes;
-    let zeros = |columns: usize| vec![0.0; runs.len() * n_samples * columns];
-    let mut traces = Traces {
-        n_samples,
-        command: zeros(n_axes),
-        measured: zeros(n_axes),
-        motor: zeros(n_axes),
-        joint: zeros(n_joints),
-        torque_disturbance: zeros(n_axes),
-        position_disturbance: zeros(n_axes),
-    };
-    // Chunks of length zero panic; with no samples there is nothing to cut.
-    let per_axis = (size * width).max(1);
-    let per_joint = (n_samples * n_joints * width).max(1);
-    let mut groups: Vec<Group<'_>> = Vec::new();
-    let parts = traces
-        .command
-        .chunks_mut(per_axis)
-        .zip(traces.measured.chunks_mut(per_axis))
-        .zip(traces.motor.chunks_mut(per_axis))
-        .zip(traces.joint.chunks_mut(per_joint))
-        .zip(traces.torque_disturbance.chunks_mut(per_axis))
-        .zip(traces.position_disturbance.chunks_mut(per_axis));
-    for (i, (((((command, measured), motor), joint), torque), position)) in parts.enumerate() {
-        groups.push(Group {
-            runs: (i * width..((i + 1) * width).min(runs.len())).collect(),
-            n_samples,
-            signals: [command, measured, motor, joint, torque, position],
-        });
-    }
+    let mut traces = Traces::zeros(batch.robot, runs.len(), n_samples);
+    let mut groups = traces.groups(runs.len(), width);
     let outcomes: Vec<Vec<Outcome>> = groups
         .par_iter_mut()
         .map(|group| group.simulate(batch, linear.as_ref()))
@@ -194,8 +212,9 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
 struct Group<'a> {
     runs: Vec<usize>,
     n_samples: usize,
-    /// Command, measured and motor position, joint position, torque and position disturbance.
-    signals: [&'a mut [f64]; 6],
+    /// Command, measured and motor position, joint position, torque and position disturbance,
+    /// readings of accelerometers.
+    signals: [&'a mut [f64]; 7],
 }
 
 impl Group<'_> {
@@ -315,7 +334,7 @@ impl Group<'_> {
         joints: &Range<usize>,
     ) {
         let n = self.n_samples;
-        let [command, measured, motor, joint, torque, position] = &mut self.signals;
+        let [command, measured, motor, joint, torque, position, readings] = &mut self.signals;
         let keep = |to: &mut [f64], values: &[S]| {
             for (slot, lane) in lanes.iter().enumerate() {
                 let row = (lane * n + sample.index) * values.len();
@@ -330,6 +349,7 @@ impl Group<'_> {
         keep(measured, sample.measured);
         keep(torque, sample.torque_disturbance);
         keep(position, sample.position_disturbance);
+        keep(readings, sample.specific_force);
         keep(joint, &sample.state[joints.clone()]);
         for (slot, lane) in lanes.iter().enumerate() {
             let row = (lane * n + sample.index) * motors.len();
@@ -368,6 +388,7 @@ impl Batch<'_> {
             noise: &noise,
             resolution: self.resolution,
             disturbances: true,
+            accelerometers: true,
             method: self.method,
             cancel: self.cancel,
         })

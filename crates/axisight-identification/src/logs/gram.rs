@@ -11,7 +11,7 @@ use axisight_numerics::Weighting;
 pub struct Block {
     /// Index of the log.
     pub record: usize,
-    /// Index of the axis. Joint encoders, if compared, count as further axes.
+    /// Index of the axis. Sensors on the arm, if compared, count as further axes.
     pub axis: usize,
     /// First entry in the residual vector.
     pub start: usize,

@@ -21,6 +21,7 @@ pub use gram::{Block, BlockGram};
 pub use inverse_dynamics::{InverseDynamics, MotionRecord};
 pub use linearize::{Column, Linearization};
 pub use loss::Loss;
+pub use outputs::{Sensed, SensedOutput};
 pub use problem::{Evaluation, FitParameter, Problem, ProblemError, Target};
 pub use record::{OwnValue, Record};
 pub use simulation_error::{SimulationErrorProblem, SimulationInput, SimulationOutput};

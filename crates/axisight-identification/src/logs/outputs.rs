@@ -1,18 +1,82 @@
 //! Compared outputs of a simulation, and what is a log's own.
 //!
-//! The outputs of a log are the motor outputs of all axes (torques or positions), then, if joint
-//! encoders are compared, the angles of the driven joints. A joint encoder has a zero of its own, so
+//! The outputs of a log are the motor outputs of all axes (torques or positions), then the readings
+//! of sensors on the arm: joint encoders and accelerometers. Such a sensor has a zero of its own, so
 //! its mean error over a log says nothing and is removed, as are the means of the derivatives. This
-//! is the least-squares fit of one offset per log and joint.
+//! is the least-squares fit of one offset per log and reading.
 
 use super::packing::Packing;
+use super::problem::{ProblemError, check_weighting, invalid};
 use super::record::Record;
 use super::simulation_error::{SimulationErrorProblem, Traces};
-use axisight_core::robot::EffectSetting;
+use axisight_core::plant::Plant;
+use axisight_core::robot::{EffectSetting, RobotDescription, n_readings};
+use axisight_core::simulation::Sample;
 use axisight_numerics::Weighting;
 use axisight_scalar::Scalar;
 
+/// What a sensor on the arm measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sensed {
+    /// Angle of the joint that an axis drives [rad].
+    JointAngle(usize),
+    /// A reading of the accelerometers [m/s^2], by its place among those of the robot.
+    SpecificForce(usize),
+}
+
+/// A compared reading of a sensor on the arm.
+#[derive(Debug, Clone)]
+pub struct SensedOutput {
+    /// The measured quantity.
+    pub quantity: Sensed,
+    /// Weighting of its error.
+    pub weighting: Weighting,
+}
+
+impl Sensed {
+    /// The quantity at a sample of `plant`.
+    pub(super) fn at<S: Scalar>(self, plant: &Plant<S>, sample: &Sample<'_, S>) -> S {
+        match self {
+            Self::JointAngle(axis) => plant.joint_angle(&plant.axes[axis], sample.state),
+            Self::SpecificForce(reading) => sample.specific_force[reading],
+        }
+    }
+
+    /// The axis to which the quantity belongs, if to a single one.
+    fn axis(self) -> Option<usize> {
+        match self {
+            Self::JointAngle(axis) => Some(axis),
+            Self::SpecificForce(_) => None,
+        }
+    }
+}
+
+/// Refuse quantities that `robot` does not have, and invalid weightings.
+pub(super) fn check_sensed(
+    sensed: &[SensedOutput],
+    robot: &RobotDescription,
+) -> Result<(), ProblemError> {
+    for one in sensed {
+        let (kind, index, count) = match one.quantity {
+            Sensed::JointAngle(axis) => ("axes", axis, robot.n_axes()),
+            Sensed::SpecificForce(k) => ("readings", k, n_readings(&robot.accelerometers)),
+        };
+        if index >= count {
+            let expected = format!("one of {count} {kind}");
+            return Err(invalid("sensed".into(), expected, index.to_string()));
+        }
+        check_weighting(&one.weighting)?;
+    }
+    Ok(())
+}
+
 impl SimulationErrorProblem {
+    /// Whether readings of accelerometers are compared.
+    pub(super) fn compares_accelerations(&self) -> bool {
+        let of_acceleration = |s: &SensedOutput| matches!(s.quantity, Sensed::SpecificForce(_));
+        self.sensed.iter().any(of_acceleration)
+    }
+
     /// Number of compared outputs of a log.
     pub(super) fn n_outputs(&self) -> usize {
         self.weightings().count()
@@ -20,7 +84,8 @@ impl SimulationErrorProblem {
 
     /// The weightings of the outputs.
     pub(super) fn weightings(&self) -> impl Iterator<Item = &Weighting> {
-        self.weighting.iter().chain(&self.joint_weighting)
+        let sensed = self.sensed.iter().map(|s| &s.weighting);
+        self.weighting.iter().chain(sensed)
     }
 
     /// Give each lane of `settings` the values that hold in its log only.
@@ -77,16 +142,15 @@ impl SimulationErrorProblem {
     /// Subtract the measured output from the simulated one.
     fn compare(&self, record: &Record, output: usize, slot: usize, traces: &mut Traces) {
         let n_axes = self.robot.n_axes();
-        let (axis, first) = (output % n_axes, record.lead * n_axes);
-        let is_joint = output >= n_axes;
-        let measured = if is_joint {
-            record.joint.as_deref().unwrap_or_default()
-        } else {
-            &record.target
+        let sensor = output.checked_sub(n_axes);
+        let (measured, place, width) = match sensor {
+            Some(place) => (&record.sensed, place, self.sensed.len()),
+            None => (&record.target, output, n_axes),
         };
-        let column = measured.iter().skip(first + axis).step_by(n_axes);
-        if is_joint && (measured.is_empty() || column.clone().any(|y| y.is_nan())) {
-            // This axis has no joint encoder.
+        let column = measured.iter().skip(record.lead * width + place);
+        let column = column.step_by(width);
+        if sensor.is_some() && (measured.is_empty() || column.clone().any(|y| y.is_nan())) {
+            // The log lacks this sensor.
             for quantity in traces {
                 quantity[slot].fill(0.0);
             }
@@ -97,15 +161,15 @@ impl SimulationErrorProblem {
         model
             .zip(column.chain(missing))
             .for_each(|(y, measured)| *y -= measured);
-        if is_joint {
-            let samples = measured[first..].len() / n_axes;
+        if sensor.is_some() {
+            let samples = measured.len() / width - record.lead;
             for quantity in traces {
                 centre(&mut quantity[slot], samples);
             }
         }
     }
 
-    /// Multiply whitened series by the certainty of the log.
+    /// Multiply whitened series of an axis by the certainty of the log.
     fn doubt(
         &self,
         record: &Record,
@@ -115,12 +179,14 @@ impl SimulationErrorProblem {
         out: &mut [Vec<Vec<f64>>],
     ) {
         let n_axes = self.robot.n_axes();
-        let Some(certainty) = &record.certainty else {
+        let axis = match output.checked_sub(n_axes) {
+            Some(place) => self.sensed[place].quantity.axis(),
+            None => Some(output),
+        };
+        let (Some(certainty), Some(axis)) = (&record.certainty, axis) else {
             return;
         };
-        let factors = certainty[output % n_axes..]
-            .iter()
-            .step_by(decimation * n_axes);
+        let factors = certainty[axis..].iter().step_by(decimation * n_axes);
         for quantity in out {
             let values = quantity[slot].iter_mut().zip(factors.clone());
             values.for_each(|(x, factor)| *x *= factor);

@@ -139,11 +139,13 @@ pub(super) fn check_logs(
         let got = weighting.len().to_string();
         return Err(invalid("weighting".into(), expected, got));
     }
-    for w in weighting {
-        w.validate()
-            .map_err(|e| invalid(e.field.into(), e.expected.into(), e.got))?;
-    }
-    Ok(())
+    weighting.iter().try_for_each(check_weighting)
+}
+
+/// Refuse an invalid weighting.
+pub(super) fn check_weighting(weighting: &Weighting) -> Result<(), ProblemError> {
+    let refused = weighting.validate();
+    refused.map_err(|e| invalid(e.field.into(), e.expected.into(), e.got))
 }
 
 /// Some of the logs of a problem, by their indices; an error if an index does not exist.

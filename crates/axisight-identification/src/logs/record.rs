@@ -24,8 +24,9 @@ pub struct Record {
     /// Factor on the weighted error of each sample, from 0 to 1: how well a model can follow the
     /// log there. `None` means one everywhere.
     pub certainty: Option<Vec<f64>>,
-    /// Measured angles of the driven joints [rad], NaN on an axis without such a sensor.
-    pub joint: Option<Vec<f64>>,
+    /// Readings of sensors on the arm, row-major `(n_samples, n_sensed)`; NaN for a sensor that the
+    /// log lacks. Empty if the log has none of them.
+    pub sensed: Vec<f64>,
     /// Effect parameters whose values hold in this log only, such as its load.
     pub own: Vec<OwnValue>,
     /// Driven joint angles at the start of the run, at rest [rad]. `None` means the operating
@@ -43,45 +44,49 @@ impl Record {
             input,
             target,
             certainty: None,
-            joint: None,
+            sensed: Vec::new(),
             own: Vec::new(),
             start: None,
             lead: 0,
         }
     }
 
-    /// The run-up and the first `n_samples` compared samples, for `n_axes` axes.
-    pub(super) fn first(&self, n_samples: usize, n_axes: usize) -> Self {
-        let kept = (self.lead + n_samples) * n_axes;
+    /// The run-up and the first `n_samples` compared samples, for `n_axes` axes and `n_sensed`
+    /// sensors on the arm.
+    pub(super) fn first(&self, n_samples: usize, n_axes: usize, n_sensed: usize) -> Self {
+        let rows = self.lead + n_samples;
+        let kept = rows * n_axes;
         let certainty = self.certainty.as_ref();
         Self {
             input: self.input[..kept.min(self.input.len())].to_vec(),
             target: self.target[..kept.min(self.target.len())].to_vec(),
             certainty: certainty.map(|c| c[..(n_samples * n_axes).min(c.len())].to_vec()),
-            joint: self.joint.as_ref().map(|j| j[..kept.min(j.len())].to_vec()),
+            sensed: self.sensed[..(rows * n_sensed).min(self.sensed.len())].to_vec(),
             own: self.own.clone(),
             start: self.start.clone(),
             lead: self.lead,
         }
     }
 
-    /// Refuse arrays that do not fit `n_axes` axes; `number` is the index of the log in the error.
-    pub(super) fn validate(&self, number: usize, n_axes: usize) -> Result<(), ProblemError> {
+    /// Refuse arrays that do not fit `n_axes` axes and `n_sensed` sensors on the arm; `number` is
+    /// the index of the log in the error.
+    pub(super) fn validate(
+        &self,
+        number: usize,
+        n_axes: usize,
+        n_sensed: usize,
+    ) -> Result<(), ProblemError> {
         let field = format!("records[{number}]");
         let (n, m) = (self.input.len(), self.target.len());
         if n != m || n == 0 || n % n_axes != 0 {
             let expected = format!("input and target of equal size, {n_axes} axes");
             return Err(invalid(field, expected, format!("{n} and {m} numbers")));
         }
-        if let Some(joint) = &self.joint
-            && joint.len() != n
-        {
-            let got = joint.len().to_string();
-            return Err(invalid(
-                format!("{field}.joint"),
-                format!("{n} numbers, as the input"),
-                got,
-            ));
+        let readings = n / n_axes * n_sensed;
+        if !self.sensed.is_empty() && self.sensed.len() != readings {
+            let got = self.sensed.len().to_string();
+            let expected = format!("{readings} numbers, {n_sensed} for each sample");
+            return Err(invalid(format!("{field}.sensed"), expected, got));
         }
         if self.lead >= n / n_axes {
             let expected = format!("less than {} samples", n / n_axes);

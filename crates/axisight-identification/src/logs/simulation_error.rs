@@ -1,6 +1,6 @@
 //! Simulation error: logs compared with a free simulation of the closed loop.
 //!
-//! The angles of the driven joints may be compared as well ([`super::outputs`]).
+//! Joint encoders and accelerometers may be compared as well ([`super::outputs`]).
 //!
 //! All logs run in lock-step in the lanes of one simulation. Derivatives are dual numbers, with a
 //! few parameters per pass ([`super::packing`]).
@@ -14,6 +14,7 @@
 
 use super::courses::{Batch, Courses, OwnRun, Runs};
 use super::gram::{Block, blocks};
+use super::outputs::{SensedOutput, check_sensed};
 use super::packing::{LANES, PARTIALS, Packing};
 use super::problem::{
     Evaluation, FitParameter, Problem, ProblemError, check_logs, invalid, picked, seeded,
@@ -66,9 +67,8 @@ pub struct SimulationErrorProblem {
     pub output: SimulationOutput,
     /// One weighting per axis.
     pub weighting: Vec<Weighting>,
-    /// One weighting per axis for the angles of the driven joints, which are then compared too.
-    /// Empty if they are not compared.
-    pub joint_weighting: Vec<Weighting>,
+    /// Compared readings of sensors on the arm, in the order of [`Record::sensed`].
+    pub sensed: Vec<SensedOutput>,
     /// Integrator.
     pub method: Method,
     /// Length of a block [s].
@@ -108,11 +108,9 @@ impl SimulationErrorProblem {
     pub fn validate(&self) -> Result<(), ProblemError> {
         let n_axes = self.robot.n_axes();
         check_logs(self.records.len(), &self.weighting, n_axes)?;
-        if !self.joint_weighting.is_empty() {
-            check_logs(self.records.len(), &self.joint_weighting, n_axes)?;
-        }
+        check_sensed(&self.sensed, &self.robot)?;
         for (i, record) in self.records.iter().enumerate() {
-            record.validate(i, n_axes)?;
+            record.validate(i, n_axes, self.sensed.len())?;
         }
         Ok(())
     }
@@ -145,7 +143,7 @@ impl SimulationErrorProblem {
         let records = self.records.iter().zip(samples);
         Ok(Self {
             records: records
-                .map(|(r, n)| Arc::new(r.first(*n, n_axes)))
+                .map(|(r, n)| Arc::new(r.first(*n, n_axes, self.sensed.len())))
                 .collect(),
             ..self.clone()
         })
@@ -263,6 +261,7 @@ impl SimulationErrorProblem {
             noise: &[],
             resolution: 0.0,
             disturbances: false,
+            accelerometers: self.compares_accelerations(),
             method,
             cancel: self.cancel.as_deref(),
         };
@@ -274,10 +273,8 @@ impl SimulationErrorProblem {
                 SimulationOutput::Torque => sample.command,
                 SimulationOutput::Position => sample.measured,
             };
-            let joint = |axis| plant.joint_angle(axis, sample.state);
-            let compared = plant.axes.iter().take(self.joint_weighting.len());
-            let joints = compared.map(joint);
-            for (number, y) in output.iter().copied().chain(joints).enumerate() {
+            let sensed = self.sensed.iter().map(|s| s.quantity.at(plant, sample));
+            for (number, y) in output.iter().copied().chain(sensed).enumerate() {
                 for (lane, record) in records.iter().enumerate() {
                     if sample.index < self.records[*record].lead {
                         continue;

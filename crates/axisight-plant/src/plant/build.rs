@@ -70,6 +70,7 @@ impl<S: Scalar> Plant<S> {
             elastic: elastic_joints(robot, &value_of),
             on_pairs: Vec::new(),
             on_arm: Vec::new(),
+            accelerometers: robot.accelerometers.clone(),
             n_motors: robot.joints.iter().filter(|j| compliant(j)).count(),
             n_base: 0,
             n_internal: 0,
@@ -175,6 +176,9 @@ impl<S: Scalar> Plant<S> {
         }
         for (joint, ..) in &mut self.elastic {
             *joint += count;
+        }
+        for accelerometer in &mut self.accelerometers {
+            accelerometer.joint += count;
         }
         for (i, joint) in joints.into_iter().enumerate() {
             let place = self.n_base + i;

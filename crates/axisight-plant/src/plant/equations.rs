@@ -8,7 +8,7 @@
 use super::axis::Axis;
 use super::own::{OnPair, Own};
 use crate::effect::{Arm, AxisTorque, CoupledAxis, Motor, Pair};
-use crate::robot::{Chain, Dynamics, DynamicsScratch};
+use crate::robot::{Accelerometer, Chain, Dynamics, DynamicsScratch, JointMotion, n_readings};
 use axisight_scalar::Scalar;
 use std::ops::Range;
 
@@ -25,6 +25,8 @@ pub struct Plant<S> {
     pub elastic: Vec<(usize, S, S)>,
     pub(super) on_pairs: Vec<OnPair<S>>,
     pub(super) on_arm: Vec<Own<S>>,
+    /// Accelerometers, with the joints of `chain`.
+    pub(super) accelerometers: Vec<Accelerometer>,
     pub(super) n_motors: usize,
     pub(super) n_base: usize,
     pub(super) n_internal: usize,
@@ -125,6 +127,24 @@ impl<S: Scalar> Plant<S> {
     /// Angles of the robot's joints in state `x`.
     pub fn joint_angles<'x>(&self, x: &'x [S]) -> &'x [S] {
         &x[self.joint_slots()]
+    }
+
+    /// Number of readings of the accelerometers: one for each direction.
+    pub fn n_readings(&self) -> usize {
+        n_readings(&self.accelerometers)
+    }
+
+    /// What the accelerometers measure in state `x` with the rates `dx` [m/s^2], written to `out`.
+    pub fn specific_force(&self, x: &[S], dx: &[S], out: &mut [S]) {
+        let (m, n) = (self.n_motors, self.chain.len());
+        let rates = m + n + m;
+        let motion = JointMotion {
+            q: &x[m..m + n],
+            v: &x[rates..rates + n],
+            a: &dx[rates..rates + n],
+        };
+        self.dynamics
+            .specific_force(motion, &self.accelerometers, out);
     }
 
     /// Compute `dx = f(x, tau)`.

@@ -26,8 +26,22 @@ pub struct Linearization {
     pub b: DMatrix<f64>,
     /// Output matrix to motor angle [rad], `(n_axes, n_states)`.
     pub c: DMatrix<f64>,
+    /// Readings of the accelerometers, `f = f0 + C_f (x - x0) + D_f (u - u0)`.
+    pub specific_force: LinearReadings,
     /// Operating point of the linearization.
     pub equilibrium: Equilibrium<f64>,
+}
+
+/// Linear readings of accelerometers about an equilibrium.
+#[derive(Debug, Clone)]
+pub struct LinearReadings {
+    /// Readings at rest [m/s^2].
+    pub rest: Vec<f64>,
+    /// Derivatives along the states, `(n_readings, n_states)`.
+    pub c: DMatrix<f64>,
+    /// Derivatives along the motor torques [m/s^2 per Nm], `(n_readings, n_axes)`; not zero only
+    /// with rigid gears.
+    pub d: DMatrix<f64>,
 }
 
 /// Reason why a robot cannot be linearized.
@@ -62,6 +76,8 @@ pub fn linearize(
         .map(|(axis, u)| axis.kernels.iter().fold(*u, |t, k| k.drive(t)))
         .collect();
     let mut jacobian = DMatrix::zeros(nx, nx + nu);
+    let mut readings = DMatrix::zeros(plant.n_readings(), nx + nu);
+    let mut read = vec![D::zero(); plant.n_readings()];
     let mut scratch = plant.scratch();
     let mut dx = vec![D::zero(); nx];
     for first in (0..nx + nu).step_by(WIDTH) {
@@ -89,6 +105,15 @@ pub fn linearize(
                 jacobian[(row, column)] = d.partials[column - first];
             }
         }
+        if read.is_empty() {
+            continue;
+        }
+        plant.specific_force(&x, &dx, &mut read);
+        for column in first..(first + WIDTH).min(nx + nu) {
+            for (row, f) in read.iter().enumerate() {
+                readings[(row, column)] = f.partials[column - first];
+            }
+        }
     }
     let mut c = DMatrix::zeros(nu, nx);
     for (row, axis) in plant.axes.iter().enumerate() {
@@ -101,6 +126,11 @@ pub fn linearize(
         a: jacobian.columns(0, nx).into_owned(),
         b: jacobian.columns(nx, nu).into_owned(),
         c,
+        specific_force: LinearReadings {
+            rest: read.iter().map(|f| f.lane(0)).collect(),
+            c: readings.columns(0, nx).into_owned(),
+            d: readings.columns(nx, nu).into_owned(),
+        },
         equilibrium: rest,
     })
 }

@@ -14,5 +14,7 @@ pub use build::{PlacedKernel, PlantError};
 pub use equations::Plant;
 pub use equilibrium::{Equilibrium, EquilibriumError, equilibrium};
 pub(crate) use linearization::WIDTH;
-pub use linearization::{Linearization, LinearizationError, Seeded, fastest_decay, linearize};
+pub use linearization::{
+    LinearReadings, Linearization, LinearizationError, Seeded, fastest_decay, linearize,
+};
 pub use zoh_response::zoh_frequency_response;

@@ -3,6 +3,7 @@
 //! The checks here are physical and independent of files. The reader of robot files runs them and
 //! reports the place of an error in the file.
 
+use super::accelerometer::Accelerometer;
 use super::setting::EffectSetting;
 use std::sync::Arc;
 
@@ -209,6 +210,8 @@ pub struct RobotDescription {
     /// Angles of the driven joints at the operating point, in chain order
     /// [rad; m if prismatic].
     pub operating_point: Vec<f64>,
+    /// Accelerometers on the links.
+    pub accelerometers: Vec<Accelerometer>,
     /// Effects that the robot's own simulator includes.
     pub effects: Vec<EffectSetting<f64>>,
     /// Relative tolerance of the robot's own parameters by quantity, if stated.

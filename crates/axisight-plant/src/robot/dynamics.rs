@@ -16,6 +16,7 @@
 //! longer than the loops.
 
 mod frame;
+mod specific_force;
 
 use self::frame::Frame;
 use super::along::Along;

@@ -1,5 +1,6 @@
 //! The arm: its description, its chain and its rigid-body algorithms.
 
+mod accelerometer;
 mod along;
 mod chain;
 mod course;
@@ -11,6 +12,7 @@ mod rigid_body;
 mod setting;
 mod vector;
 
+pub use accelerometer::{Accelerometer, JointMotion, n_readings};
 pub use along::{Along, Course};
 pub use chain::{Body, Chain, ChainJoint, Pose};
 pub use description::{

@@ -3,6 +3,7 @@
 use super::controller::{ControlLoop, OwnLaw};
 use super::late_reading::LateReading;
 use super::method::{Interval, Method, Stepper};
+use super::sensing::Sensing;
 use super::torque_path::{SampleTorque, TorqueBuffers, TorquePath};
 use crate::effect::EffectError;
 use crate::plant::{Axis, EquilibriumError, Lead, Plant, PlantError, equilibrium};
@@ -50,6 +51,8 @@ pub struct Run<'a> {
     pub resolution: f64,
     /// Whether samples include the torque that effects add on the motors; otherwise it is zero.
     pub disturbances: bool,
+    /// Whether samples include the readings of the accelerometers; otherwise there are none.
+    pub accelerometers: bool,
     /// Flag by which another thread ends the run early.
     pub cancel: Option<&'a AtomicBool>,
 }
@@ -82,6 +85,9 @@ pub struct Sample<'a, S> {
     pub torque_disturbance: &'a [S],
     /// Error of the position measurement, noise included [rad].
     pub position_disturbance: &'a [S],
+    /// Readings of the accelerometers [m/s^2]: the directions of the first one, then of the next
+    /// one. Empty unless the run requests them.
+    pub specific_force: &'a [S],
     /// State `[phi, q, phi', q']`.
     pub state: &'a [S],
 }
@@ -190,6 +196,7 @@ pub fn simulate<S: Scalar>(
         .collect();
     let mut signals = Signals::of(plant, &rest.motor_angle, run.sample_time);
     let mut buffers = TorqueBuffers::new(n_axes);
+    let mut sensing = Sensing::new(plant, &rest, stepper, run.accelerometers);
     for k in 0..n_samples {
         if run.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
             return Ok(Status::Cancelled(k));
@@ -199,7 +206,11 @@ pub fn simulate<S: Scalar>(
         if run.disturbances {
             signals.disturb(plant, &x);
         }
-        observe(&signals.sample(k, &x));
+        if let Some(sensing) = &mut sensing {
+            sensing.read(plant, k, &x);
+        }
+        let readings = sensing.as_ref().map_or(&[][..], |s| &s.readings);
+        observe(&signals.sample(k, &x, readings));
         let interval = Interval {
             plant,
             command: &signals.command,
@@ -209,6 +220,9 @@ pub fn simulate<S: Scalar>(
         let mut torque =
             SampleTorque::new(&mut paths, &signals.command, &signals.added, &mut buffers);
         let met = interval.advance(run.method, &mut x, stepper, &mut torque);
+        if let Some(sensing) = &mut sensing {
+            sensing.note(&torque, &signals.command);
+        }
         torque.finish();
         if !all_finite(&x) {
             return Ok(Status::Diverged(k));
@@ -425,8 +439,13 @@ impl<S: Scalar> Signals<S> {
         plant.motor_disturbances(x, &self.command, &mut self.torque_disturbance);
     }
 
-    /// The sample `index` in state `x`, for an observer.
-    pub fn sample<'a>(&'a self, index: usize, x: &'a [S]) -> Sample<'a, S> {
+    /// The sample `index` in state `x` with the readings of accelerometers, for an observer.
+    pub fn sample<'a>(
+        &'a self,
+        index: usize,
+        x: &'a [S],
+        specific_force: &'a [S],
+    ) -> Sample<'a, S> {
         Sample {
             index,
             command: if self.reported.is_empty() {
@@ -437,6 +456,7 @@ impl<S: Scalar> Signals<S> {
             measured: &self.measured,
             torque_disturbance: &self.torque_disturbance,
             position_disturbance: &self.position_disturbance,
+            specific_force,
             state: x,
         }
     }

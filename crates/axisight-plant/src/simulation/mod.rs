@@ -11,6 +11,7 @@ mod late_target;
 mod method;
 mod nystrom4;
 mod runge_kutta4;
+mod sensing;
 mod torque_path;
 
 pub use closed_loop::{

@@ -287,6 +287,11 @@ impl<'a, S: Scalar> SampleTorque<'a, S> {
         &self.buffers.lines
     }
 
+    /// Torque lines of the last span.
+    pub fn lines(&self) -> &[Line<S>] {
+        &self.buffers.lines
+    }
+
     /// Torque lines of the part `i` of `n` equal parts of the sample.
     pub fn part(&mut self, i: usize, n: usize) -> &[Line<S>] {
         self.span(i as f64 / n as f64, (i + 1) as f64 / n as f64)

@@ -282,6 +282,7 @@ def _commanded(robot: Robot, log: Log, step: int) -> Log:
         velocity_rad_s=_between_known(log.velocity_rad_s, step),
         joint_position_rad=_between_known(log.joint_position_rad, step),
         temperature_c=None,
+        acceleration_m_s2={},
     )
 
 
@@ -312,5 +313,6 @@ def _thinned(log: Log, step: int) -> Log:
         velocity_ref_rad_s=None if reference is None else reference[::step],
         velocity_rad_s=None if velocity is None else velocity[::step],
         joint_position_rad=None if joint is None else joint[::step],
+        acceleration_m_s2={n: x[::step] for n, x in log.acceleration_m_s2.items()},
         run_up=None,
     )

@@ -19,10 +19,9 @@ from axisight.fitting import (
     effect_parameter,
     fit,
     robot_parameter,
-    simulation_residuals,
-    spectral_weighting,
 )
 from axisight.graybox.multiaxis.starts import from_its_start
+from axisight.graybox.multiaxis.weightings import Sensors
 from axisight.logs import Log
 from axisight.robot import Robot
 
@@ -44,9 +43,10 @@ class JointStep:
     """Result of step 3.
 
     ``fit`` is the last fit, ``effects`` those of the model with their fitted values, ``robot`` the robot with
-    its fitted parameters. ``weighting`` and ``joint_weighting`` (None without encoders) are those of the last
-    fit, and ``passes`` counts the fits. ``fit_percent`` and ``initial_fit_percent`` (n_logs, n_axes) are the
-    fit (3.54) of the torque at the end and before step 3 [%].
+    its fitted parameters. ``weighting``, ``joint_weighting`` (None without encoders) and
+    ``acceleration_weighting`` (None without accelerometers) are those of the last fit. ``passes`` counts the
+    fits. ``fit_percent`` and ``initial_fit_percent`` (n_logs, n_axes) are the fit (3.54) of the torque at the
+    end and before step 3 [%].
     """
 
     fit: Fitted
@@ -54,6 +54,7 @@ class JointStep:
     effects: tuple[Effect, ...]
     weighting: Weighting
     joint_weighting: Weighting | None
+    acceleration_weighting: Weighting | None
     passes: int
     initial_fit_percent: Real
     fit_percent: Real
@@ -100,14 +101,14 @@ def joint_step(
     The spectrum of the residuals serves as the noise model of a prediction-error fit. It is estimated at the
     start and again after each fit, until the residuals are white. Raises InputError as `axisight.fit`.
     """
-    joints = any(log.joint_position_rad is not None for log in logs)
+    sensors = Sensors.of(logs)
     placed = [from_its_start(robot, log) for log in logs]
-    before = simulation_residuals(robot, placed, effects=effects, joints=joints, options=options)
+    before = sensors.residuals(robot, placed, effects, options)
     residuals, model, acting = before, robot, list(effects)
     found: Fitted | None = None
     passes = 0
     while found is None or passes < PASSES:
-        weighting, of_joints = _weightings(robot, logs, residuals)
+        weighting, of_joints, of_accelerations = sensors.weightings(robot, logs, residuals)
         parameters = _parameters(model, names, acting, more, found)
         rough = replace(options, loss_tolerance=_FIRST_TOLERANCE)
         chosen = rough if passes == 0 else options
@@ -118,15 +119,14 @@ def joint_step(
             effects=acting,
             weighting=weighting,
             joint_weighting=of_joints,
+            acceleration_weighting=of_accelerations,
             options=chosen,
         )
         passes += 1
         model, acting = _with_values(model, acting, found)
         # The deflection at the start follows from the stiffness.
         placed = [from_its_start(model, log) for log in logs]
-        residuals = simulation_residuals(
-            model, placed, effects=acting, joints=joints, options=options
-        )
+        residuals = sensors.residuals(model, placed, acting, options)
         per_residual = found.loss / max(len(found.core.residual), 1)
         if passes > 1 and abs(per_residual - 1.0) < _SETTLED:
             break
@@ -136,27 +136,12 @@ def joint_step(
         effects=tuple(acting),
         weighting=weighting,
         joint_weighting=of_joints,
+        acceleration_weighting=of_accelerations,
         passes=passes,
         initial_fit_percent=_fit_percent(robot, logs, before),
         fit_percent=_fit_percent(robot, logs, residuals),
         findings=tuple(f"step 3: {text}" for text in found.warnings),
     )
-
-
-def _weightings(
-    robot: Robot, logs: Sequence[Log], residuals: Sequence[Real]
-) -> tuple[Weighting, Weighting | None]:
-    step = logs[0].sample_time_s
-    n = robot.n_axes
-    motors = spectral_weighting([r[:, :n] for r in residuals], step)
-    if residuals[0].shape[1] == n:
-        return motors, None
-    measured = [
-        r[:, n:]
-        for r, log in zip(residuals, logs, strict=True)
-        if log.joint_position_rad is not None
-    ]
-    return motors, spectral_weighting(measured, step)
 
 
 def _parameters(

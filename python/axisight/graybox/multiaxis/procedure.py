@@ -97,7 +97,8 @@ def identify_robot(
     together. Step 3 fits everything to all logs in the time domain, in closed loop if robot and logs allow it
     (`axisight.fit`), with residuals weighted by their spectrum. Wernholt (2004), section 9.3.
 
-    Joint encoders (``joint_position_rad``) of the logs are compared too. Logs may have different loads.
+    Joint encoders (``joint_position_rad``) and accelerometers (``acceleration_m_s2``) of the logs are compared
+    too. Logs may have different loads.
 
     Parameters
     ----------

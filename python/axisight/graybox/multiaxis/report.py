@@ -77,8 +77,12 @@ def _elastic(step: ElasticStep) -> list[str]:
 
 
 def _joint(elastic: ElasticStep, step: JointStep) -> list[str]:
-    sensors = "motors" if step.joint_weighting is None else "motors and joint encoders"
-    out = [f"Step 3: all parameters together, in the time domain, from {sensors}"]
+    more = {
+        "joint encoders": step.joint_weighting,
+        "accelerometers": step.acceleration_weighting,
+    }
+    sensors = ["motors", *(name for name, weighting in more.items() if weighting is not None)]
+    out = [f"Step 3: all parameters together, in the time domain, from {' and '.join(sensors)}"]
     before = elastic.robot.parameters()
     for name, value, std in zip(step.fit.names, step.fit.values, step.fit.std, strict=True):
         was = f"   start {before[name]:.4g}" if name in before else ""

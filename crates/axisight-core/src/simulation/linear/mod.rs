@@ -16,6 +16,7 @@ mod harmonics;
 mod plant;
 mod propagator;
 mod sampled;
+mod sensing;
 mod tiles;
 
 pub use plant::{LinearPlant, LinearPlantError, Operations};

@@ -3,6 +3,7 @@
 use super::harmonics::Ripple;
 use super::plant::{LinearAxis, LinearPlant};
 use super::propagator::Propagator;
+use super::sensing::LinearSensing;
 use super::tiles::Tiles;
 use axisight_plant::simulation::{
     ControlLoop, Line, Method, OwnLaw, Run, Sample, SampleTorque, Signals, SimulationError, Status,
@@ -61,7 +62,8 @@ fn samples<S: Scalar>(
             return Status::Cancelled(k);
         }
         state.signals(run, k);
-        observe(&state.signals.sample(k, &state.absolute));
+        let readings = &state.sensing.readings;
+        observe(&state.signals.sample(k, &state.absolute, readings));
         let mut torque = SampleTorque::new(
             paths,
             &state.signals.command,
@@ -130,6 +132,7 @@ struct LinearLoop<'a, S: Scalar> {
     torque_ripple: bool,
     controller: ControlLoop<S>,
     signals: Signals<S>,
+    sensing: LinearSensing<'a, S>,
     /// Ripple at the present motor angles.
     ripple: Vec<Ripple<S>>,
     powers: Vec<[S; 2]>,
@@ -186,6 +189,7 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
                 own_laws(plant, run)?,
             )?,
             signals: Signals::new(m),
+            sensing: LinearSensing::new(plant, run),
             ripple,
             powers,
             angles: angle,
@@ -243,6 +247,20 @@ impl<'a, S: Scalar> LinearLoop<'a, S> {
                 self.ripple_at_prediction();
             }
         }
+        if !self.sensing.readings.is_empty() {
+            self.sense(lines);
+        }
+    }
+
+    /// Read the accelerometers at the end of a step under the torques `lines`.
+    fn sense(&mut self, lines: &[Line<S>]) {
+        let m = self.plant.n_axes();
+        for (i, (axis, line)) in self.plant.axes.iter().zip(lines).enumerate() {
+            let ripple = self.ripple[i].torque(self.signals.command[i]).value;
+            self.sensing
+                .note(i, line.at(1.0) - S::constant(axis.torque) + ripple);
+        }
+        self.sensing.read(&self.input[2 * m..]);
     }
 
     /// Evaluate the ripple at the predicted motor angles.

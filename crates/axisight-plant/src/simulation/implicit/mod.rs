@@ -315,6 +315,7 @@ mod tests {
             controller: Controller::None,
             position_noise_std: 0.0,
             operating_point: vec![0.3],
+            accelerometers: Vec::new(),
             effects: Vec::new(),
             tolerances: Vec::new(),
         }
