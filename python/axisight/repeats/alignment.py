@@ -25,6 +25,9 @@ SAME_POSITION = 0.01
 SAME_SPEED = 0.02
 # An axis with a smaller range, as a share of the largest range, stands still: its noise is no motion.
 _STANDS = 1e-3
+# Mean square difference of speeds, relative to their mean square, at which two lags fit equally well; and the
+# factor on the least difference at which noise decides between them.
+_ALIKE, _TIED = 1e-4, 2.0
 # Least common part of the shortest run.
 _LEAST_COMMON = 0.8
 
@@ -123,16 +126,32 @@ def _speed(log: Log, cutoff_hz: float) -> Array:
 def _lag(guide: Array, other: Array) -> int:
     """Return the lag k of ``other``: its sample n + k is sample n of the ``guide``.
 
-    The sum of products over the overlap is largest there. A longer overlap has a larger sum, so that of
-    the lags of a periodic motion the smallest one is taken.
+    The mean square difference over the overlap is least there. Of the lags of a periodic motion, at which it
+    is about as small, the smallest counts.
     """
     size = np.sqrt(np.mean(guide**2, axis=0))
-    weight = np.where(size > _STANDS * size.max(), 1.0 / np.maximum(size, 1e-300), 0.0) ** 2
-    total = sum(
-        w * scipy.signal.correlate(other[:, i], guide[:, i], method="fft")
-        for i, w in enumerate(weight)
+    moves = np.flatnonzero(size > _STANDS * size.max())
+    lags, apart = _differences(guide[:, moves] / size[moves], other[:, moves] / size[moves])
+    near = np.flatnonzero(apart <= max(_ALIKE * len(moves), _TIED * float(apart.min())))
+    at = int(near[np.argmin(np.abs(lags[near]))])
+    for step in (-1, 1):
+        while 0 <= at + step < len(lags) and apart[at + step] < apart[at]:
+            at += step
+    return int(lags[at])
+
+
+def _differences(one: Array, two: Array) -> tuple[Whole, Array]:
+    """Return lags whose overlap is half of the shorter signal or more, and mean square differences there."""
+    n, m = len(one), len(two)
+    lags = np.arange(1 - n, m)
+    first, last = np.maximum(0, -lags), np.minimum(n, m - lags)
+    product = sum(
+        scipy.signal.correlate(two[:, i], one[:, i], method="fft") for i in range(one.shape[1])
     )
-    return int(np.argmax(total)) - (len(guide) - 1)
+    a, b = (np.append(0.0, np.cumsum(np.sum(x**2, axis=1))) for x in (one, two))
+    squares = a[last] - a[first] + b[last + lags] - b[first + lags] - 2.0 * product
+    wide = last - first >= 0.5 * min(n, m)
+    return lags[wide], squares[wide] / (last - first)[wide]
 
 
 def _part(log: Log, part: slice) -> Log:

@@ -60,7 +60,8 @@ def _shifts(aligned: AlignedRuns) -> list[str]:
     if not late.any():
         return []
     return [
-        f"starts differ by up to {late.max() * aligned.sample_time_s:.3g} s; runs are aligned to whole samples"
+        f"starts differ by up to {late.max() * aligned.sample_time_s:.3g} s; runs are aligned to whole samples "
+        f"and compared over the {aligned.logs[0].duration_s:.3g} s that they share"
     ]
 
 
