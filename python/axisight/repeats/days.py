@@ -14,7 +14,7 @@ _PLACE = "{day}"
 
 
 def days_of(paths: Sequence[Path], by: str = FOLDER) -> list[str]:
-    """Return the day of each log, from its path.
+    """Return the day of each log, from the ``paths`` of the logs.
 
     ``by``: ``"folder"``, the name of the folder that holds the log; or a pattern of the file name with
     ``{day}`` where the day stands, as in ``"{day}_run*"``; ``*`` and ``?`` stand for any text and any

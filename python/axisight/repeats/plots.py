@@ -18,7 +18,7 @@ _LONGEST = 12
 
 
 def plot_days(found: DayComparison, *, width_in: float = 7.2) -> Figure:
-    """Plot every parameter of the axes over the days: runs, and day means with their 95 % intervals.
+    """Plot every parameter of the axes over the days: runs, and day means with their intervals.
 
     Parameters that moved are orange. Load parameters are drawn if one moved. Returns a Figure ``width_in``
     inches wide. Raises InputError for anything but the result of :func:`axisight.repeats.compare_days`.
@@ -71,7 +71,7 @@ def _draw(axes: Axes, one: xr.Dataset, found: DayComparison) -> None:
         color=colour,
         capsize=3,
         lw=1.2,
-        label="mean of the day, 95 % interval",
+        label=f"mean of the day, {100 * (1 - found.level):g} % interval",
     )
     word = "moved" if bool(one["moved"].item()) else ""
     axes.set_title(
