@@ -11,12 +11,12 @@ from axisight.errors import InputError
 from axisight.logs import Log
 from axisight.repeats.alignment import align
 from axisight.repeats.columns import columns_of, unexplained
+from axisight.repeats.family import judged
 from axisight.repeats.findings import findings_of
 from axisight.repeats.motions import run_motions
 from axisight.repeats.parameter_changes import parameter_table, with_power
 from axisight.repeats.result import DayComparison
 from axisight.repeats.run_parameters import run_parameters
-from axisight.repeats.tests_of_days import tested
 from axisight.repeats.torque_scatter import place_table, torque_table
 from axisight.robot import Robot
 from axisight.statistics.one_way import OneWay
@@ -77,7 +77,7 @@ def compare_days(
     believed = (left[table["axis"].values - 1] <= _EXPLAINED) & (not alone)
     table = table.assign(believed=("parameter", believed))
     torque = torque.assign(unexplained=("axis", left))
-    table, torque = tested(table, torque, level)
+    table, torque = judged(table, torque, level)
     tests = int(np.isfinite(table["p_value"]).sum() + np.isfinite(torque["p_value"]).sum())
     table = with_power(table, runs.counts, level / max(tests, 1))
     return DayComparison(

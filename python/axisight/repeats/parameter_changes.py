@@ -31,7 +31,8 @@ def parameter_table(
     ``runs`` holds the values of the parameters, ``reference`` is the day (from 0) that changes refer to, and
     ``level`` the probability of any false finding. Intervals of day means hold with 1 - ``level`` each, those
     of the changes of one parameter together (Bonferroni). ``torque_share`` is the largest difference between
-    two days as a torque, relative to ``torque_nm`` (n_axes,); samples count by ``weight`` (n_samples, n_axes).
+    two days as a torque that no other parameter could give, relative to ``torque_nm`` (n_axes,). Samples count
+    by ``weight`` (n_samples, n_axes).
     """
     between, within = runs.components
     _, freedom = runs.freedom
@@ -74,10 +75,18 @@ def parameter_table(
 
 
 def torque_per_unit(columns: Columns, weight: Array, torque_nm: Array) -> Array:
-    """Return the rms torque (n_parameters,) of one unit of each parameter, relative to that of the axis."""
-    counted = np.maximum(weight.sum(axis=0), 1.0)[:, None]
-    squares = np.einsum("na,rnak->ak", weight, columns.matrix**2) / counted / len(columns.matrix)
-    return np.asarray((np.sqrt(squares) / torque_nm[:, None]).max(axis=0))
+    """Return the rms torque (n_parameters,) of one unit of each parameter that no other parameter could give.
+
+    It is relative to the torque of the axis, ``torque_nm`` (n_axes,). Parameters with similar columns change
+    together, each against the other: their columns alone would make such changes look large.
+    """
+    scaled = (weight / torque_nm)[..., None] * columns.matrix[0]
+    k = scaled.shape[-1]
+    r = np.linalg.qr(scaled.reshape(-1, k), mode="r")
+    # Norm of a column less its projection on the others.
+    own = 1.0 / np.linalg.norm(np.linalg.inv(r), axis=1)
+    samples = weight.sum(axis=0)
+    return np.asarray(own / np.sqrt(samples[samples > 0].mean()))
 
 
 def with_power(table: xr.Dataset, counts: NDArray[np.intp], significance: float) -> xr.Dataset:

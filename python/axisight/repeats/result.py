@@ -39,7 +39,8 @@ class DayComparison:
         Dataset over (day, parameter): ``value``, ``lower``, ``upper``, ``change``, ``change_lower``,
         ``change_upper``; over (run, parameter): ``run_value``; over (parameter): ``std_within_run`` from
         noise within a run, ``std_between_runs`` beyond it, ``std_of_run`` of both, ``std_between_days``,
-        ``torque_share`` (the largest difference between days as a share of the torque), ``believed``
+        ``torque_share`` (the largest difference between days as a torque that no other
+        parameter could give, a share of the torque), ``believed``
         (values, not only changes, are known), ``p_value``, ``p_adjusted``, ``echo``, ``moved``, and
         ``least_change``, which is found with 95 % probability. Coordinates ``unit`` and ``axis`` (from 1).
     torque

@@ -11,13 +11,13 @@ from axisight.statistics.holm import holm
 Array = NDArray[np.float64]
 
 ECHO = 0.05
-"""A change below this share of the largest one, both as torques relative to the axis' torque, may be its echo.
+"""A change below this share of the largest one may be its echo, both as torques relative to that of the axis.
 
 No regression is exact: a part of every change shows in other parameters, and in closed loop on other axes.
 """
 
 
-def tested(
+def judged(
     parameters: xr.Dataset, torque: xr.Dataset, level: float
 ) -> tuple[xr.Dataset, xr.Dataset]:
     """Return both tables with ``p_adjusted`` of one family (Holm), ``echo`` and ``moved``.
