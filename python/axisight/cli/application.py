@@ -36,6 +36,11 @@ _COMMANDS = {
         "Diagnose",
         "Check a log: rate, gaps, NaN, saturation, quantization, units, constant channels.",
     ),
+    "repeat": (
+        "repeat:repeat_command",
+        "Diagnose",
+        "Compare runs of one motion over days: which parameter moved, and what is chance.",
+    ),
     "explore": (
         "explore:explore_command",
         "Diagnose",

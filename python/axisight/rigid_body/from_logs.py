@@ -274,7 +274,7 @@ def identify_logs(
     motions, others = quiet[: len(given)], quiet[len(given) :]
     moving = ~np.concatenate(standing[: len(given)])
     weight, left_out = reversal_weight(motions, reversal_s, cutoff_hz, moving)
-    joint = [_joint_motion(model, motion) for motion in motions]
+    joint = [joint_motion(model, motion) for motion in motions]
     stacked = [np.concatenate(parts) for parts in zip(*joint, strict=True)]
     base = base_parameters(model, known=known or (), locked=True)
     left_out += few_samples(base, (stacked[0], stacked[1], stacked[2]), weight)
@@ -298,7 +298,7 @@ def identify_logs(
             torque_std_nm=estimate.residual_std_nm,
             prior_std=prior_spread(model, prior_share),
         )
-    joint += [_joint_motion(model, motion) for motion in others]
+    joint += [joint_motion(model, motion) for motion in others]
     thetas = {"estimate": estimate.standard()}
     if possible is not None:
         thetas["consistent"] = possible.theta
@@ -329,6 +329,14 @@ def _estimate(log: Log, robot: Robot, cutoff_hz: float, torque_held: bool) -> Mo
         raise InputError(f"logs: expected Logs, got {type(log).__name__}")
     if log.n_axes != robot.n_axes:
         raise InputError(f"{log.name}: expected {robot.n_axes} axes, got {log.n_axes}")
+    return log_motion(log, cutoff_hz, torque_held=torque_held)
+
+
+def log_motion(log: Log, cutoff_hz: float, *, torque_held: bool) -> MotionEstimate:
+    """Return the filtered motion of a log, with ``torque_held`` as in :func:`identify_logs`.
+
+    Raises InputError naming the log.
+    """
     torque = log.torque_nm
     if torque_held:
         # The command before the first is unknown, but the filter drops that sample anyway.
@@ -341,8 +349,8 @@ def _estimate(log: Log, robot: Robot, cutoff_hz: float, torque_held: bool) -> Mo
         raise InputError(f"{log.name}: {error}") from None
 
 
-def _joint_motion(model: TorqueModel, motion: MotionEstimate) -> Motion:
-    """Return the motion of all joints and the motor torques, with elastic joints at zero."""
+def joint_motion(model: TorqueModel, motion: MotionEstimate) -> Motion:
+    """Return position, velocity and acceleration of all joints, with elastic joints at zero, and motor torques."""
     parts = []
     for motor in (motion.position_rad, motion.velocity_rad_s, motion.acceleration_rad_s2):
         full = np.zeros((motion.n_samples, model.robot.n_joints))
