@@ -60,8 +60,8 @@ Despite = Annotated[
         "Faults of the logs to accept although they are refused, by name, such as 'rows_missing'."
     ),
 ]
-FromS = Annotated[float, _text("Leave out what comes before this time of each log, in s.")]
-ToS = Annotated[float | None, _text("Leave out what comes after this time of each log, in s.")]
+StartS = Annotated[float, _text("Leave out what comes before this time of each log, in s.")]
+StopS = Annotated[float | None, _text("Leave out what comes after this time of each log, in s.")]
 Moving = Annotated[bool, _text("Use each log from its first to its last motion only.")]
 CutoffHz = Annotated[
     float | None,
