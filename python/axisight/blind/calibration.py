@@ -103,11 +103,12 @@ def _judged_with(
 
 
 def _said(judged: Sequence[Judged]) -> tuple[Array, Array]:
-    """Return the stated probability of every named cause, and whether the cause is true (1 or 0)."""
+    """Return the stated probability of every named cause that has one, and whether the cause is true (1 or 0)."""
     pairs = [
         (p, float(label in j.truth))
         for j in judged
         for p, label in zip(j.probabilities, j.named, strict=True)
+        if np.isfinite(p)
     ]
     said, right = np.array(pairs, dtype=np.float64).reshape(-1, 2).T
     return said, right
@@ -115,7 +116,12 @@ def _said(judged: Sequence[Judged]) -> tuple[Array, Array]:
 
 def _families(judged: Sequence[Judged]) -> NDArray[np.str_]:
     """Return the family of every named cause, in the order of `_said`."""
-    effects = [label.split("@")[0] for j in judged for label in j.named]
+    effects = [
+        label.split("@")[0]
+        for j in judged
+        for p, label in zip(j.probabilities, j.named, strict=True)
+        if np.isfinite(p)
+    ]
     return np.array([effect_info(name).family for name in effects], dtype=np.str_)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 
 from axisight.arguments import short
+from axisight.blind.entries import NO_ENTRY, as_verdict
 from axisight.blind.sealed import SEAL, seal_of
 from axisight.documents import parse_json, read_text
 from axisight.effects import effect_table
@@ -45,6 +46,7 @@ class Judged:
       verdict says that no size would show, NaN if it states no limit.
     - ``reduction``: `gap_reduction` of the first cause. A true cause that is the only one removes the whole
       gap.
+    - ``seconds``: time of the diagnosis [s], NaN if it is not stated.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Judged:
     missed: Mapping[str, float] = field(default_factory=dict)
     reduction: float = float("nan")
     n_axes: int = 0
+    seconds: float = float("nan")
 
     @property
     def kind(self) -> str:
@@ -108,32 +111,40 @@ class Share:
         return f"{self.hits}/{self.of} = {100 * self.hits / self.of:.0f} % [{100 * low:.0f}, {100 * high:.0f}]"
 
 
-def judged_cases(cases: Path, truths: Path, verdicts: Path) -> list[Judged]:
+def judged_cases(cases: Path, truths: Path, verdicts: Path, *, every: bool = False) -> list[Judged]:
     """Return every verdict with its truth.
 
-    ``cases``, ``truths`` and ``verdicts`` are folders. Raises InputError for a missing truth, for one that
+    ``cases``, ``truths`` and ``verdicts`` are folders; verdicts may be entries, see `as_verdict`. With ``every``,
+    each case counts: one without a verdict as failed. Raises InputError for a missing truth, for one that
     differs from the truth its case was sealed with, for a damaged verdict, and for a folder without verdicts.
     """
-    out = []
-    for path in sorted(verdicts.glob("*.json")):
-        text = _read(truths / path.name, "the truth of a verdict")
-        seal = _read(cases / path.stem / SEAL, "the seal of a case").strip()
-        if seal_of(text) != seal:
-            raise InputError(f"{truths / path.name}: expected the truth its case was sealed with")
-        truth = _parsed(truths / path.name, text)
-        verdict = _parsed(path, _read(path, "a verdict"))
-        try:
-            out.append(_judged(path.stem, truth, verdict))
-        except InputError:
-            raise
-        except Exception as error:  # a damaged file may lack any field or hold any type
-            raise InputError(
-                f"{path}: expected a verdict as axisight writes it, and its truth, got one that is damaged "
-                f"({short(repr(error))})"
-            ) from error
-    if not out:
+    paths = sorted(verdicts.glob("*.json"))
+    if not paths:
         raise InputError(f"{verdicts}: expected verdicts (*.json), got none")
-    return out
+    if every:
+        sealed = sorted(seal.parent.name for seal in cases.glob(f"*/{SEAL}"))
+        paths = [verdicts / f"{name}.json" for name in sealed]
+    return [_judged_case(cases, truths, path, every=every) for path in paths]
+
+
+def _judged_case(cases: Path, truths: Path, path: Path, *, every: bool) -> Judged:
+    text = _read(truths / path.name, "the truth of a verdict")
+    seal = _read(cases / path.stem / SEAL, "the seal of a case").strip()
+    if seal_of(text) != seal:
+        raise InputError(f"{truths / path.name}: expected the truth its case was sealed with")
+    truth = _parsed(truths / path.name, text)
+    if every and not path.exists():
+        return _judged(path.stem, truth, NO_ENTRY)
+    verdict = as_verdict(_parsed(path, _read(path, "a verdict")), str(path))
+    try:
+        return _judged(path.stem, truth, verdict)
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file may lack any field or hold any type
+        raise InputError(
+            f"{path}: expected a verdict as axisight writes it, and its truth, got one that is damaged "
+            f"({short(repr(error))})"
+        ) from error
 
 
 def _read(path: Path, what: str) -> str:
@@ -293,7 +304,13 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
         n_axes=n_axes,
         ratios=tuple(ratios),
         covered=tuple(covered),
+        seconds=_seconds(verdict),
     )
+
+
+def _seconds(verdict: dict[str, Any]) -> float:
+    stated = verdict.get("provenance", {}).get("seconds")
+    return float("nan") if stated is None else float(stated)
 
 
 def figures(judged: Sequence[Judged]) -> dict[str, Share]:

@@ -101,6 +101,11 @@ _COMMANDS = {
         "Reference",
         "Print the script by which bash, zsh or fish complete commands and options.",
     ),
+    "mcp": (
+        "assistants.command:mcp_command",
+        "Assistants",
+        "Serve check, columns, diagnosis and next experiment to an assistant, for the files of one folder.",
+    ),
     "blind": (
         "blind:blind_app",
         "Benchmarks",
@@ -115,7 +120,7 @@ _COMMANDS = {
 
 
 # Commands with many threads and small matrices, in which the threads of the linear algebra would only spin.
-_THREADED = ("blind", "demo", "diagnose", "explore")
+_THREADED = ("blind", "demo", "diagnose", "explore", "mcp")
 
 # Commands that only print, so that --quiet would be pointless.
 _ONLY_PRINT = ("schema", "effects", "completion", "list", "show")

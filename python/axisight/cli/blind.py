@@ -1,4 +1,4 @@
-"""The commands ``axisight blind make``, ``run`` and ``score``."""
+"""The commands ``axisight blind make``, ``run``, ``score`` and ``compare``."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from typing import Annotated, Any
 import typer
 
 from axisight.arguments import counted
-from axisight.blind import judged_cases, markdown, summary
+from axisight.blind import comparison, comparison_table, judged_cases, markdown, summary
 from axisight.blind.page import render_score
 from axisight.cli.common import Force, bars, complain, errors, say, write_each, write_text
 from axisight.cli.screen import OUT, is_output
+from axisight.errors import InputError
 from axisight.fleet import diagnose_fleet
 from axisight.gap import Settings
 from axisight.storage import check_folder, check_targets, write_bytes
@@ -133,6 +134,49 @@ def score_command(
         ]
         writes += [partial(_draw, name, score, path) for name, path in drawn.items()]
         write_each(writes)
+
+
+@blind_app.command("compare")
+def compare_command(
+    cases: Annotated[Path, typer.Argument(help="Folder of cases; all of them count.")],
+    truth: Annotated[Path, typer.Option(help="Folder of the truths.")],
+    entries: Annotated[
+        list[str],
+        typer.Option(
+            metavar="NAME=FOLDER",
+            help="A method and its folder of entries or verdicts, one JSON per case (repeatable).",
+        ),
+    ],
+    out: Annotated[Path | None, typer.Option(help="Write the table here (Markdown).")] = None,
+    json: Annotated[
+        Path | None, typer.Option(help="Write the comparison here as JSON; - is standard output.")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Open the truths: the scores of several methods on the same cases; a missing entry is wrong."""
+    with errors():
+        if is_output(json):
+            OUT.leave_output()
+        targets = {"--out": out, "--json": None if is_output(json) else json}
+        check_targets(targets, replaces={"--out": (".md",), "--json": (".json",)}, force=force)
+        found = comparison(cases, truth, _methods(entries))
+        text = comparison_table(found)
+        say(text)
+        files = {out: text, json: dumps(found, indent=1) + "\n"}
+        write_each([partial(write_text, path, made) for path, made in files.items() if path])
+
+
+def _methods(given: list[str]) -> dict[str, Path]:
+    """Return the folders of ``--entries`` by method; raise InputError for other text and for a repeated name."""
+    found: dict[str, Path] = {}
+    for text in given:
+        name, equals, folder = text.partition("=")
+        if not (name and equals and folder):
+            raise InputError(f"--entries: expected NAME=FOLDER, got {text!r}")
+        if name in found:
+            raise InputError(f"--entries: expected {name!r} once, got it twice")
+        found[name] = Path(folder)
+    return found
 
 
 # File name of a figure -> function of `axisight.blind.plots` that draws it.

@@ -19,6 +19,7 @@ from axisight.gap.facts.faults import refused
 from axisight.gap.intake.inputs import read_beside
 from axisight.gap.intake.preview import look_beside
 from axisight.logs import LogReport, check_log, render
+from axisight.logs.map_files import AnyMap
 from axisight.logs.mending import mending_line
 from axisight.logs.untrusted import check_log_inside
 
@@ -52,21 +53,26 @@ def check_command(
         if untrusted:
             check_log_inside(log)
         found = check_log(log, columns, max_bytes=max_bytes)
-        OUT.print(render(found))
-        wrong = (item.message for item in found.findings if item.severity == "error")
-        near = next(filter(None, map(suggestion, wrong)), None)
-        if near is not None:
-            say(f"Did you mean {near}?")
-        fits = found.ok and (robot is None or _fits(robot, options, found, columns, max_bytes))
-        if not fits:
+        show_report(found)
+        good = found.ok and (robot is None or fits(robot, options, found, columns, max_bytes))
+        if not good:
             raise typer.Exit(1)
 
 
-def _fits(
+def show_report(found: LogReport) -> None:
+    """Print the report on a log, and the name that was probably meant for one that is missing."""
+    OUT.print(render(found))
+    wrong = (item.message for item in found.findings if item.severity == "error")
+    near = next(filter(None, map(suggestion, wrong)), None)
+    if near is not None:
+        say(f"Did you mean {near}?")
+
+
+def fits(
     model: str,
     options: ModelOptions,
     alone: LogReport,
-    columns: Path | None,
+    columns: AnyMap | Path | None,
     max_bytes: int | None,
 ) -> bool:
     """Print what a diagnosis would refuse, flag and compare; return False if it would refuse the log."""

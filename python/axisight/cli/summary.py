@@ -53,19 +53,26 @@ _DETAILS = (
 
 
 def summary(
-    found: Diagnosis, width: int, given: Collection[str] = (), command: str = ""
+    found: Diagnosis,
+    width: int,
+    given: Collection[str] = (),
+    command: str = "",
+    steps: Sequence[str] | None = None,
 ) -> list[str]:
     """Return the lines of a diagnosis for a screen of ``width`` columns, the verdict first.
 
     ``given`` lists the output options in use. Each of them prints a line later, so the summary is shorter.
-    ``command`` is the command that takes the offered options, empty if it is the running one.
+    ``command`` is the command that takes the offered options, empty if it is the running one. ``steps`` replaces
+    the next steps of the command line.
     """
+    if steps is None:
+        steps = next_steps(found, given, command)
     width = min(max(width, _NARROWEST), _WIDEST)
     most = MOST_LINES - len(given)
     lines: list[str] = []
     for detail in _DETAILS:
         sections = [part(found, width, detail) for part in _SECTIONS]
-        sections.append(_next(next_steps(found, given, command), width, detail))
+        sections.append(_next(steps, width, detail))
         between = [""] if detail.blanks else []
         lines = []
         for section in filter(None, sections):
@@ -86,7 +93,7 @@ def next_steps(found: Diagnosis, given: Collection[str] = (), command: str = "")
         "--write-model": f"--write-model FILE writes the simulator with {_them(found)}.",
         "--report": "--report report.html draws where the gap lies.",
     }
-    if found.verdict != "undecidable" or not _can_be_designed(found):
+    if found.verdict != "undecidable" or not can_be_designed(found):
         del offers["--next-experiment"]
     if found.verdict == "undecidable" or not found.causes:
         del offers["--write-model"]
@@ -102,7 +109,8 @@ def next_steps(found: Diagnosis, given: Collection[str] = (), command: str = "")
     return out
 
 
-def _can_be_designed(found: Diagnosis) -> bool:
+def can_be_designed(found: Diagnosis) -> bool:
+    """Whether an experiment can be designed: of torques that were compared in closed loop."""
     return found.mode == "closed_loop" and found.gap.compared == "torques"
 
 

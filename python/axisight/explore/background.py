@@ -22,7 +22,9 @@ class Background:
     - ``state``: ``idle``, ``running``, ``stopping``, ``stopped``, ``failed`` or ``done``.
     - ``says``: the present step, or why the diagnosis failed.
     - ``share``: how much of the present step is done [1].
-    - ``document``: the verdict, once the state is ``done``.
+    - ``found``: the diagnosis, and ``document``: its verdict, once the state is ``done``.
+    - ``error``: the exception that ended it, once the state is ``failed``.
+    - ``steps``: how many times the diagnosis reported progress.
     """
 
     def __init__(
@@ -42,6 +44,9 @@ class Background:
         self._thread: threading.Thread | None = None
         self.state, self.says, self.share = "idle", "", 0.0
         self.document: dict[str, Any] | None = None
+        self.found: Any = None
+        self.error: Exception | None = None
+        self.steps = 0
 
     @property
     def busy(self) -> bool:
@@ -72,18 +77,20 @@ class Background:
         if self._stop.is_set():
             raise _StoppedError
         self.says, self.share = f"{label}: {done} of {total}", done / max(total, 1)
+        self.steps += 1
 
     def _diagnose(self) -> None:
         try:
-            found = self._run(**self._work, progress=self._progress)
-            self.document = found.to_verdict()
+            self.found = self._run(**self._work, progress=self._progress)
+            self.document = self.found.to_verdict()
         except _StoppedError:
             self.state, self.says = "stopped", "nothing was kept"
         except AxisightError as error:
-            self.state, self.says = "failed", str(error)
+            self.error, self.says, self.state = error, str(error), "failed"
         except Exception as error:
             # A thread that dies silently would leave the page waiting.
-            self.state, self.says = "failed", f"{type(error).__name__}: {error}"
+            self.error, self.says = error, f"{type(error).__name__}: {error}"
+            self.state = "failed"
             raise
         else:
             self.state, self.says = "done", ""

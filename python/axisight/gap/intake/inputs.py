@@ -10,6 +10,7 @@ from axisight.arguments import usable_path
 from axisight.errors import InputError
 from axisight.gap.prepare.used_part import WHOLE, Used
 from axisight.logs import Log, read_case, read_log
+from axisight.logs.map_files import AnyMap
 from axisight.logs.sources import files_of, is_folder_log
 from axisight.logs.untrusted import check_log_inside
 from axisight.robot import Robot, load_robot
@@ -45,7 +46,7 @@ def read_inputs(
     paths: Sequence[Path],
     model: str | None,
     validation: Sequence[Path],
-    columns: Path | None,
+    columns: AnyMap | Path | None,
     load: Callable[..., Robot] = load_robot,
     used: Used = WHOLE,
     simulated: Sequence[Path] = (),
@@ -98,7 +99,7 @@ def _used(read: Inputs, used: Used) -> Inputs:
 def read_beside(
     model: str,
     paths: Sequence[Path],
-    columns: Path | None,
+    columns: AnyMap | Path | None,
     load: Callable[..., Robot] = load_robot,
     *,
     bare: Callable[..., Robot] = load_robot,
@@ -129,7 +130,7 @@ def _read(
     paths: Sequence[Path],
     model: str | None,
     validation: Sequence[Path],
-    columns: Path | None,
+    columns: AnyMap | Path | None,
     loads: tuple[Callable[..., Robot], Callable[..., Robot]],
     untrusted: bool,
     max_bytes: int | None,
