@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from axisight.arguments import one_of
 from axisight.cli.common import Force, errors, say
 from axisight.cli.screen import OUT
 from axisight.errors import InputError
@@ -50,6 +51,8 @@ def randomize_command(
             raise InputError(
                 f"--out: expected --for beside it, one of {', '.join(PROJECTS)}, got nothing"
             )
+        if project is not None:
+            one_of("--for", project, PROJECTS)
         check_targets(
             {"--out": out, "--plot": plot}, inputs=[posterior], replaces=_REPLACED, force=force
         )

@@ -6,9 +6,6 @@ from dataclasses import dataclass
 
 from axisight.display.summary import summarized
 
-# Probability of calling any constant parameter one that varies.
-FALSE_ALARMS = 0.05
-
 
 @summarized
 @dataclass(frozen=True)

@@ -17,12 +17,10 @@ from axisight.errors import InputError
 from axisight.posterior.between_runs import BetweenRuns
 from axisight.posterior.parameter import PosteriorParameter, Simulated
 from axisight.posterior.sampling import Mixture, Part
+from axisight.posterior.settings import CORRELATED
 from axisight.statistics.intervals import NORMAL_DEVIATIONS
 
 Array = NDArray[np.float64]
-
-CORRELATED = 0.5
-"""Absolute correlation [1] above which two parameters must be drawn together."""
 
 
 @summarized

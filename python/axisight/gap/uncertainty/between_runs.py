@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.rank_deficiency import pseudo_inverse
 from axisight.gap.search.balanced_values import stretches
-from axisight.posterior.between_runs import FALSE_ALARMS, BetweenRuns
+from axisight.posterior.between_runs import BetweenRuns
+from axisight.posterior.settings import DETERMINED, FALSE_ALARMS, TELLS
 
 Array = NDArray[np.float64]
-
-# Least share of a parameter's change that the step of one log recovers, for the log to determine the parameter.
-_DETERMINED = 0.5
 
 
 def between_runs(at: FittedModel, names: Sequence[str], same: Array) -> tuple[BetweenRuns, ...]:
@@ -25,15 +23,21 @@ def between_runs(at: FittedModel, names: Sequence[str], same: Array) -> tuple[Be
 
     Each log k takes one step from the joint fit, held to it by the tolerances: d = -(M_k + P)^-1 g_k, with the log's
     normal equations M_k and gradient g_k. A true change u moves it by A u, A = (M_k + P)^-1 M_k, so d is divided by the
-    diagonal of A where that is above one half; other logs do not determine the parameter.
+    diagonal of A where that is above one half. Other logs do not determine the parameter, nor do logs with less than 5 %
+    of the information of an average log.
 
     The noise of d comes from the scatter of what is left between the stretches of the log. ``same`` (p,) is added in
-    squares: estimates that differ by no more than errors of formulas count as the same. Welch's test compares the
+    squares: estimates that differ by no more than errors of formulas count as the same. Where it is infinite, nothing
+    is tested. Welch's test compares the
     estimates, since logs have different noise (Welch 1951, Biometrika 38(3/4)). Their excess over the noise is the
     variance between runs (DerSimonian and Laird 1986, Controlled Clinical Trials 7(3)). All tests together have 5 %
     false alarms (Holm 1979).
     """
-    logs = [_of_log(at, log) for log in np.unique(at.log)]
+    told = [np.diag(at.matrix[at.log == log].sum(axis=0)) for log in np.unique(at.log)]
+    enough = TELLS * np.mean(told, axis=0)
+    logs = [
+        _of_log(at, log, mine >= enough) for log, mine in zip(np.unique(at.log), told, strict=True)
+    ]
     estimate = np.array([one.estimate for one in logs])
     tested = [_tested(logs, j, float(same[j])) for j in range(len(names))]
     varies = _holm([p for _, p in tested])
@@ -55,14 +59,15 @@ class _OfLog:
     freedom: int
 
 
-def _of_log(at: FittedModel, log: int) -> _OfLog:
+def _of_log(at: FittedModel, log: int, tells: NDArray[np.bool_]) -> _OfLog:
+    """Return the estimates of a log; ``tells`` (p,): on which parameters it has enough information."""
     mine = at.log == log
     number = stretches(at)[mine]
     matrix, gradient = at.matrix[mine], at.gradient[mine]
     known = pseudo_inverse(matrix.sum(axis=0) + at.prior_matrix)
     recovered = np.diag(known @ matrix.sum(axis=0))
     free = np.array([name not in at.at_bound for name in at.parameters], dtype=bool)
-    used = free & (recovered > _DETERMINED)
+    used = free & tells & (recovered > DETERMINED)
     step = -known @ gradient.sum(axis=0)
     # What the step of the log leaves in each of its stretches, as a change of the parameters.
     left = gradient + matrix @ step
@@ -78,7 +83,7 @@ def _of_log(at: FittedModel, log: int) -> _OfLog:
 
 def _tested(logs: Sequence[_OfLog], column: int, same: float) -> tuple[float, float | None]:
     """Return the standard deviation of a parameter between runs, and the p-value of its test; None without a test."""
-    used = [one for one in logs if np.isfinite(one.estimate[column])]
+    used = [one for one in logs if np.isfinite(one.estimate[column]) and np.isfinite(same)]
     count = len(used)
     if count < 2:
         return 0.0, None

@@ -14,16 +14,10 @@ from axisight.gap.views.view import View
 from axisight.logs import Log
 from axisight.posterior.result import Posterior
 from axisight.posterior.sampled_robot import split_values
+from axisight.posterior.settings import FIRST_NOISE_RUN, HELD_OUT_DRAWS, HELD_OUT_TIMES
 from axisight.statistics.intervals import NORMAL_DEVIATIONS
 
 Array = NDArray[np.float64]
-
-DRAWS = 50
-"""Samples that are simulated along each validation log."""
-# Samples in time that a Dataset keeps of each log.
-_POINTS = 2000
-# First run of the noise of these simulations, behind those of the floor.
-_FIRST_RUN = 1000
 
 
 def held_out_torque(
@@ -31,7 +25,7 @@ def held_out_torque(
 ) -> tuple[xr.Dataset, ...]:
     """Return a Dataset over (time_s, axis) for each log, thinned to 2,000 times at most.
 
-    - ``measured_torque_nm``; ``simulated_torque_nm`` (draw, time_s, axis): `DRAWS` samples with noise.
+    - ``measured_torque_nm``; ``simulated_torque_nm`` (draw, time_s, axis): `HELD_OUT_DRAWS` samples with noise.
     - ``predicted_torque_nm``, ``low_torque_nm``, ``high_torque_nm``: Gaussian band that holds 95 % of measured torque.
       Its variance is that of the simulated samples, plus the noise. The noise is the floor, or what the model leaves
       on the estimation logs if that is more.
@@ -48,16 +42,16 @@ def held_out_torque(
     for k, log in enumerate(logs):
         drawn = np.array([torques[k] for torques in every])
         whole = np.isfinite(drawn).all(axis=(1, 2))
-        own = noise * view.noises([log], _FIRST_RUN + k)[0]
+        own = noise * view.noises([log], FIRST_NOISE_RUN + k)[0]
         out.append(_dataset(view, log, drawn[whole], own, left, int((~whole).sum())))
     return tuple(out)
 
 
 def _variants(posterior: Posterior) -> list[Variant]:
-    drawn = posterior.samples(DRAWS)
+    drawn = posterior.samples(HELD_OUT_DRAWS)
     which = drawn.hypothesis.values
     out = []
-    for i in range(DRAWS):
+    for i in range(HELD_OUT_DRAWS):
         values = {name: float(drawn[name].values[i]) for name in posterior.names}
         plain, effects = split_values(posterior, values, int(which[i]))
         out.append(Variant(plain, tuple(effects)))
@@ -78,8 +72,8 @@ def _dataset(
     mean = drawn.mean(axis=0)
     reach = NORMAL_DEVIATIONS * np.sqrt(drawn.var(axis=0, ddof=1) + variance)
     inside = (np.abs(measured - mean) <= reach)[view.counted(log)[:, 0] > 0]
-    step = max(1, -(-log.n_samples // _POINTS))
-    rng = np.random.default_rng([view.settings.seed, _FIRST_RUN, log.n_samples])
+    step = max(1, -(-log.n_samples // HELD_OUT_TIMES))
+    rng = np.random.default_rng([view.settings.seed, FIRST_NOISE_RUN, log.n_samples])
     # The noise of one run, shifted in time by sample, and as large as the band has it.
     scale = np.sqrt(variance / np.maximum(np.mean(own**2, axis=0), 1e-300))
     noisy = np.array([x + scale * np.roll(own, int(rng.integers(len(own))), axis=0) for x in drawn])

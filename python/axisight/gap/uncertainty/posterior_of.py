@@ -9,7 +9,7 @@ from importlib.metadata import version
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import Effect
+from axisight.effects import Effect, effect_info
 from axisight.gap.facts.result import Diagnosis
 from axisight.gap.facts.simulator_variant import Variant
 from axisight.gap.fit.fitted_model import FittedModel
@@ -31,12 +31,10 @@ from axisight.gap.views.view import View
 from axisight.logs import Log
 from axisight.posterior.parameter import DrivenAxis, PosteriorParameter, Simulated
 from axisight.posterior.result import Posterior, PosteriorHypothesis
+from axisight.posterior.settings import BOOTSTRAP_DRAWS
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
-
-# Draws of the block bootstrap that the covariance is compared with.
-_DRAWS = 500
 
 
 def posterior_of(
@@ -62,7 +60,7 @@ def posterior_of(
         here = at if k == 0 else evaluated(fitter, one.model)
         hypotheses.append(parts.hypothesis(view, one.model, here, known, one.weight / total))
     names = [parameter_name(leading, key) for key in leading.parameters]
-    deviations = bootstrap_std(at, draws=_DRAWS, seed=view.settings.seed)
+    deviations = bootstrap_std(at, draws=BOOTSTRAP_DRAWS, seed=view.settings.seed)
     out = Posterior(
         name=found.name,
         verdict=found.verdict,
@@ -157,6 +155,9 @@ def _same(view: View, model: FittedModel) -> Array:
     for i, (place, name) in enumerate(model.parameters):
         if place is None:
             out[i] = view.settings.model_error * nominal_and_size(view.robot, name)[1]
+        elif name in effect_info(model.effects[place].name).marked("place"):
+            # A place is no size that could vary: the share of friction behind a gear, say.
+            out[i] = np.inf
     return out
 
 

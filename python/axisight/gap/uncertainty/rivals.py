@@ -12,10 +12,7 @@ from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.ranking.posterior import RankedHypothesis
 from axisight.gap.search.state import SearchState
-
-# Most hypotheses beside the leading one, and the least weight of one relative to it.
-_MOST = 5
-_LEAST = 0.02
+from axisight.posterior.settings import LEAST_ODDS, MOST_RIVALS
 
 
 @dataclass(frozen=True)
@@ -78,12 +75,12 @@ def _combinations(
     """Return the likeliest choices of at least one rival, each with the cause that it replaces."""
     options = [[None, *group] for group in groups]
     every = [[one for one in pick if one is not None] for pick in itertools.product(*options)]
-    return sorted((pick for pick in every if pick), key=len)[:_MOST]
+    return sorted((pick for pick in every if pick), key=len)[:MOST_RIVALS]
 
 
 def _odds(found: SearchState, label: str, rival: RankedHypothesis) -> float:
     winner = next(r for r, _ in found.accepted if r.trial.label == label)
-    return max(rival.probability / max(winner.probability, 1e-300), _LEAST)
+    return max(rival.probability / max(winner.probability, 1e-300), LEAST_ODDS)
 
 
 def _fitted_hypothesis(rival: RankedHypothesis) -> Hypothesis:

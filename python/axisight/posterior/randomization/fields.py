@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from axisight.display.summary import summarized
 from axisight.posterior.randomization.homes import Kind, Number
-from axisight.posterior.result import CORRELATED, Posterior
+from axisight.posterior.result import Posterior
+from axisight.posterior.settings import CORRELATED
 from axisight.statistics.intervals import NORMAL_DEVIATIONS
 
 Array = NDArray[np.float64]
