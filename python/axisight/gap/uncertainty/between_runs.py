@@ -23,15 +23,14 @@ def between_runs(at: FittedModel, names: Sequence[str], same: Array) -> tuple[Be
 
     Each log k takes one step from the joint fit, held to it by the tolerances: d = -(M_k + P)^-1 g_k, with the log's
     normal equations M_k and gradient g_k. A true change u moves it by A u, A = (M_k + P)^-1 M_k, so d is divided by the
-    diagonal of A where that is above one half. Other logs do not determine the parameter, nor do logs with less than 5 %
-    of the information of an average log.
+    diagonal of A. A log does not determine a parameter if that is below one half, or if the log has less than 5 % of
+    the information of an average log.
 
     The noise of d comes from the scatter of what is left between the stretches of the log. ``same`` (p,) is added in
     squares: estimates that differ by no more than errors of formulas count as the same. Where it is infinite, nothing
-    is tested. Welch's test compares the
-    estimates, since logs have different noise (Welch 1951, Biometrika 38(3/4)). Their excess over the noise is the
-    variance between runs (DerSimonian and Laird 1986, Controlled Clinical Trials 7(3)). All tests together have 5 %
-    false alarms (Holm 1979).
+    is tested. Welch's test compares the estimates, since logs have different noise (Welch 1951, Biometrika 38(3/4)).
+    Their excess over the noise is the variance between runs (DerSimonian and Laird 1986, Controlled Clinical Trials
+    7(3)). All tests together have 5 % false alarms (Holm 1979).
     """
     told = [np.diag(at.matrix[at.log == log].sum(axis=0)) for log in np.unique(at.log)]
     enough = TELLS * np.mean(told, axis=0)
