@@ -79,7 +79,7 @@ class PosteriorParameter:
     - ``effect``, ``quantity``: effect and parameter that hold the value in a simulation. For a parameter of
       `Robot.parameters`, ``effect`` is None and ``quantity`` is the end of its name.
     - ``neutral``: nominal value of an own parameter; value without the effect for a cause.
-    - ``lower``, ``upper``: bounds of the fit. Samples stay within them.
+    - ``lower``, ``upper``: bounds of the effect, or of an own parameter in the fit. Samples stay within them.
     - ``changes``: own parameter that a cause changes, and how (``"absolute"`` or ``"relative"``).
     """
 

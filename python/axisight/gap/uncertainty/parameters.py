@@ -52,7 +52,6 @@ def cause_parameter(robot: Robot, free: Hypothesis, name: str) -> PosteriorParam
     effect = free.effect
     info = effect_info(effect.name)
     known = next(p for p in info.parameters if p.name == name)
-    lower, upper = free.limits(name)
     spread = known.spread if known.prior == "log_normal" else known.typical
     centre = known.typical if known.prior == "log_normal" else known.neutral
     prior = Prior(known.prior, centre, spread)
@@ -70,8 +69,9 @@ def cause_parameter(robot: Robot, free: Hypothesis, name: str) -> PosteriorParam
         effect=effect.name,
         quantity=name,
         neutral=known.neutral,
-        lower=lower,
-        upper=upper,
+        # Intervals of the verdict have these bounds, too; a fit may have narrower ones.
+        lower=known.lower,
+        upper=known.upper,
         prior=prior,
         axes=effect.axes,
         changes=changes,

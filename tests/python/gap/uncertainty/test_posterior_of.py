@@ -10,6 +10,8 @@ from axisight.errors import InputError
 from axisight.gap import verdict_schema
 from axisight.posterior import from_datatree, sampled_robot, to_datatree
 from gap_data import HELD, bare_axis, log_of, logs_of, reference, scattered
+from rigid_arm import COULOMB_NM, VISCOUS, arm
+from rigid_arm import log_of as rigid_log
 
 FRICTION = Effect("coulomb_friction", 1, {"coulomb_nm": 0.5, "smoothing_rad_s": 0.05})
 COULOMB = "coulomb_friction@1.coulomb_nm"
@@ -54,8 +56,8 @@ def test_the_verdict_stays_as_it_is_and_threads_change_nothing(case):
     assert "posterior" not in verdict_schema()["properties"]
 
 
-def test_intervals_are_those_of_the_verdict(case):
-    _, _, found = case
+def check_intervals(found):
+    """The intervals of every cause and own parameter are those of the verdict."""
     known = found.posterior.gaussian()
     for cause in found.causes:
         for name, interval in cause.parameters.items():
@@ -64,12 +66,31 @@ def test_intervals_are_those_of_the_verdict(case):
                 (interval.low, interval.value, interval.high), rel=1e-9, abs=1e-15
             )
     fit = found.posterior.gaussian(formula_error=False)
-    for name, change in found.refit.items():
-        nominal = found.posterior.simulated.nominal[name]
+    for name in set(found.refit) & set(found.posterior.best.names):
+        change, nominal = found.refit[name], found.posterior.simulated.nominal[name]
         one = fit.sel(parameter=name)
-        reach = 1.96 * float(one.deviation) / nominal
-        assert float(one.value) / nominal - 1 == pytest.approx(change.value, abs=1e-12)
+        reach = 1.96 * float(one.deviation) / abs(nominal)
+        assert (float(one.value) - nominal) / abs(nominal) == pytest.approx(change.value, abs=1e-12)
         assert reach == pytest.approx((change.high - change.low) / 2, rel=1e-9)
+
+
+def test_intervals_are_those_of_the_verdict(case):
+    _, _, found = case
+    assert found.causes and found.refit
+    check_intervals(found)
+
+
+def test_by_inverse_dynamics():
+    """Six axes with friction that follows another formula; a balanced fit has standard errors of its own."""
+    robot = arm()
+    logs = [rigid_log(robot, seed, COULOMB_NM, VISCOUS, 20.0) for seed in range(3)]
+    found = diagnose(
+        robot=robot, estimation=logs[:2], validation=logs[2:], settings=SETTINGS, posterior=True
+    )
+    assert found.mode == "inverse_dynamics" and len(found.causes) == 12
+    check_intervals(found)
+    assert 0.93 < found.posterior.held_out[0].attrs["inside"] < 0.975
+    assert not any(x.varies for x in found.posterior.between_runs)
 
 
 def test_the_band_holds_held_out_torque(case):
