@@ -22,6 +22,7 @@ from axisight import Effect, excitation, frf, records
 from axisight.blind.plots import plot_calibration, plot_confusion
 from axisight.cli.demo import write_demo_case
 from axisight.excitation.plots import plot_optimal_spectrum, plot_references, plot_signal
+from axisight.posterior import plot_corner
 from axisight.responses import plot_levels
 
 PAGE = Path(__file__).resolve().parent / "plots.md"
@@ -63,6 +64,10 @@ SHOWN = {
     "axisight.plot_parameters": (
         "found",
         "Values of the causes with their 95 % intervals, each relative to its value.",
+    ),
+    "axisight.posterior.plot_corner": (
+        "posterior",
+        "Parameters of a [posterior](posterior.md) by pairs, with their correlations.",
     ),
     "axisight.plot_overlay": (
         "found, axis=2",
@@ -125,7 +130,7 @@ def figures() -> dict[str, Callable[[], Figure]]:
     worn = axisight.simulate(robot, reference[0][:4000], effects=[friction], noise_seed=1)
     with tempfile.TemporaryDirectory() as folder:
         case = write_demo_case(Path(folder))
-        found, log = axisight.diagnose(case), axisight.read_case(case).validation[0]
+        found, log = axisight.diagnose(case, posterior=True), axisight.read_case(case).validation[0]
     score: dict[str, Any] = json.loads(SCORE.read_text("utf-8"))
     return {
         "plot_log": lambda: axisight.plot_log(log),
@@ -133,6 +138,7 @@ def figures() -> dict[str, Callable[[], Figure]]:
         "plot_gap_map": lambda: axisight.plot_gap_map(found),
         "plot_ranking": lambda: axisight.plot_ranking(found),
         "plot_parameters": lambda: axisight.plot_parameters(found),
+        "plot_corner": lambda: plot_corner(found.posterior, number=800),
         "plot_overlay": lambda: axisight.plot_overlay(found, axis=2),
         "plot_response_matrix": lambda: axisight.plot_response_matrix(all_),
         "plot_bode": lambda: axisight.plot_bode(

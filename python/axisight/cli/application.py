@@ -31,6 +31,11 @@ _COMMANDS = {
         "Diagnose",
         "Make a small case, a simulated machine with an effect that its simulator lacks, and diagnose it.",
     ),
+    "randomize": (
+        "randomize:randomize_command",
+        "Diagnose",
+        "Turn the posterior of a diagnosis into ranges and joint draws for training.",
+    ),
     "check": (
         "check:check_command",
         "Diagnose",

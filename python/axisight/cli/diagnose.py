@@ -130,6 +130,15 @@ def diagnose_command(
             help="Write measured and simulated torques of all logs, before and after: .parquet or .mcap.",
         ),
     ] = None,
+    posterior: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="NC",
+            rich_help_panel=OUTPUT,
+            help="Write the joint posterior of all parameters here, as a NetCDF file (.nc) for ArviZ and "
+            "'axisight randomize'.",
+        ),
+    ] = None,
     exit_code: Annotated[
         bool,
         typer.Option(
@@ -281,6 +290,7 @@ def diagnose_command(
             "--torque-limit": torque_limit,
             "--write-model": write_model,
             "--signals": signals,
+            "--posterior": posterior,
             "--simulated": simulated,
             "--explain": explain,
             "--verbose": verbose,
@@ -332,7 +342,14 @@ def diagnose_command(
         )
         asked = None if experiment_on is None else experiment_on(inputs.robot)
         outputs = Outputs(
-            json, report, write_model, signals, next_experiment, to_show is not None, force
+            json,
+            report,
+            write_model,
+            signals,
+            posterior,
+            next_experiment,
+            to_show is not None,
+            force,
         )
         outputs.check(inputs, [*inputs.files(), *_described(case_or_logs, columns)])
         settings = Settings(
@@ -357,6 +374,7 @@ def diagnose_command(
                 to_show=None if asked is None else asked.to_show,
                 within=None if asked is None else asked.within,
                 signals=signals is not None,
+                posterior=posterior is not None,
                 simulated=inputs.simulated,
             )
         show_diagnosis(found, verbose=verbose, given=outputs.given())

@@ -28,6 +28,19 @@ def write_found_signals(found: Diagnosis, target: Path) -> None:
     say(f"signals: {axisight.signal_files.write_signals(found.signals, target, overwrite=True)}")
 
 
+def write_found_posterior(found: Diagnosis, target: Path) -> None:
+    """Write the posterior of a diagnosis; print the path and how much held-out torque its band holds."""
+    assert found.posterior is not None
+    path = axisight.posterior.save_posterior(found.posterior, target)
+    inside = [one.attrs["inside"] for one in found.posterior.held_out]
+    share = (
+        f"; its 95 % band holds {sum(inside) / len(inside):.1%} of held-out torque"
+        if inside
+        else ""
+    )
+    say(f"posterior: {path}{share}")
+
+
 def write_found_model(
     found: Diagnosis, inputs: Inputs, options: ModelOptions, target: Path, *, force: bool
 ) -> None:

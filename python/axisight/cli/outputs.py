@@ -13,12 +13,14 @@ from axisight.cli.outcomes import (
     diagnosis_writes,
     write_found_experiment,
     write_found_model,
+    write_found_posterior,
     write_found_signals,
 )
 from axisight.cli.screen import is_output
 from axisight.gap import Diagnosis
 from axisight.gap.facts.experiment import experiment_files
 from axisight.gap.intake.inputs import Inputs
+from axisight.posterior.files import check_library
 from axisight.storage import check_targets
 
 # Suffixes of earlier results that an output may replace without --force.
@@ -26,6 +28,7 @@ _RESULTS = {
     "--json": (".json",),
     "--report": (".html", ".htm"),
     "--signals": (".parquet", ".mcap"),
+    "--posterior": (".nc",),
     "--write-model": (),
 }
 
@@ -41,6 +44,7 @@ class Outputs:
     report: Path | None
     model: Path | None
     signals: Path | None
+    posterior: Path | None
     next_experiment: Path | None
     to_show: bool
     force: bool
@@ -52,6 +56,7 @@ class Outputs:
             "--report": self.report,
             "--write-model": self.model,
             "--signals": self.signals,
+            "--posterior": self.posterior,
             "--next-experiment": self.next_experiment,
         }
         return [option for option, path in files.items() if path is not None]
@@ -60,13 +65,14 @@ class Outputs:
         """Raise OutputError, naming the option, for files that cannot be written or must not be replaced.
 
         ``read`` are the files that the command reads. Raises MissingExtraError if a library for the signals
-        is not installed.
+        or the posterior is not installed.
         """
         targets = {
             "--json": None if is_output(self.json) else self.json,
             "--report": self.report,
             "--write-model": self.model,
             "--signals": self.signals,
+            "--posterior": self.posterior,
         }
         if self.next_experiment is not None:
             for path in experiment_files(self.next_experiment):
@@ -76,6 +82,8 @@ class Outputs:
             axisight.write_back.check_target(inputs.robot_source, self.model, overwrite=self.force)
         if self.signals is not None:
             axisight.signal_files.check_target(self.signals, overwrite=True)
+        if self.posterior is not None:
+            check_library()
 
     def writes(
         self, found: Diagnosis, inputs: Inputs, options: ModelOptions
@@ -90,4 +98,6 @@ class Outputs:
             out.append(made)
         if self.signals is not None:
             out.append(partial(write_found_signals, found, self.signals))
+        if self.posterior is not None:
+            out.append(partial(write_found_posterior, found, self.posterior))
         return out

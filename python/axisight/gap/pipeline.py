@@ -15,7 +15,6 @@ from axisight.gap.fit.time_limit import TimeLimit
 from axisight.gap.intake.given import Given, check_options, given_inputs
 from axisight.gap.intake.prepared_logs import behind_gate
 from axisight.gap.measure.by_axis import believed_by_axis
-from axisight.gap.measure.torque_traces import signals_of
 from axisight.gap.screening.search_round import Progress
 from axisight.gap.search.balanced_values import with_balanced_values
 from axisight.gap.search.reported_torque import with_constants_told
@@ -24,6 +23,7 @@ from axisight.gap.search.stated_effects import with_scatter_taken
 from axisight.gap.separate.asked import asked_of
 from axisight.gap.separate.waves import ExperimentLimits
 from axisight.gap.simulator.tolerances import loaded
+from axisight.gap.uncertainty.beside_verdict import Wanted
 from axisight.gap.verdict.assembled import assembled
 from axisight.gap.verdict.validated import validated
 from axisight.logs import AnyMap, Case, Log
@@ -54,6 +54,7 @@ def diagnose(
     to_show: Effect | None = None,
     within: ExperimentLimits | None = None,
     signals: bool = False,
+    posterior: bool = False,
     simulated: LogsLike = (),
 ) -> Diagnosis:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks.
@@ -80,6 +81,8 @@ def diagnose(
     to_show : design the experiment that shows this effect, of this size, if the machine has it.
     within : limits of speed, travel and torque for either experiment; by default what the logs show.
     signals : keep measured and simulated torques of all logs, ``Diagnosis.signals``.
+    posterior : also keep the joint distribution of all parameters, ``Diagnosis.posterior``, and simulate
+        50 samples of it along the validation logs. The verdict stays as it is.
     simulated : logs of your own simulator under the same references, or along the same motion: one for
         each estimation log, then one for each validation log. ``Diagnosis.simulator`` says how far the
         model reproduces it. The gap is then that of your simulator, by inverse dynamics if motions
@@ -102,7 +105,8 @@ def diagnose(
     check_options(settings)
     given = given_inputs(case, logs, robot, estimation, validation, simulated, columns)
     asked = Asking(separate, to_show, within)
-    found = _diagnosed(given, name or given.name, settings or Settings(), progress, asked, signals)
+    wanted = Wanted(signals, posterior)
+    found = _diagnosed(given, name or given.name, settings or Settings(), progress, asked, wanted)
     return replace(found, checks=(*given.says, *found.checks))
 
 
@@ -121,7 +125,7 @@ def _diagnosed(
     chosen: Settings,
     progress: Progress,
     asking: Asking,
-    signals: bool,
+    wanted: Wanted,
 ) -> Diagnosis:
     """Return the diagnosis of a simulator and logs with roles."""
     started, limit = time.monotonic(), TimeLimit(chosen.time_limit_s)
@@ -170,9 +174,7 @@ def _diagnosed(
         keep = bool(unknown) and out.verdict == "undecidable"
         out = asked.added(out, view, seen.found, keep=keep)
         progress("designing an experiment", 1, 1)
-    if signals:
-        after = seen.reach.simulator
-        out = replace(out, signals=signals_of(view, held_logs, after, logged=commanded is None))
+    out = wanted.added(out, view, held_logs, seen, progress, logged=commanded is None)
     checks = (*out.checks, *inputs.says(view.mode, view.compared))
     found_faults = (*inputs.constants(out.refit), *out.findings)
     out = replace(out, simulator=inputs.simulator, checks=checks, findings=found_faults)

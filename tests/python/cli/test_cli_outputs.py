@@ -67,11 +67,14 @@ def test_simulate_keeps_its_input(case):
 
 
 @pytest.mark.parametrize(
-    "option", ["--json", "--report", "--write-model", "--signals", "--next-experiment"]
+    "option",
+    ["--json", "--report", "--write-model", "--signals", "--next-experiment", "--posterior"],
 )
 def test_diagnose_tries_its_outputs_before_the_work(case, no_work, option):
     (case / "file").write_text("")
-    name = {"--write-model": "m.toml", "--signals": "s.parquet"}.get(option, "x")
+    name = {"--write-model": "m.toml", "--signals": "s.parquet", "--posterior": "v.nc"}.get(
+        option, "x"
+    )
     said = run("diagnose", case, option, case / "file" / name, status=2)
     assert option in said
     assert "expected a folder" in said

@@ -29,6 +29,7 @@ MODULES = (
     axisight.montecarlo,
     axisight.mujoco,
     axisight.paths,
+    axisight.posterior,
     axisight.records,
     axisight.repeats,
     axisight.responses,

@@ -24,6 +24,7 @@ from axisight.gap.facts.faults import Finding
 from axisight.gap.facts.schema import VERDICT_SCHEMA
 from axisight.gap.facts.shown import cause_in_words, cause_rows, percent
 from axisight.gap.facts.trace import Trace
+from axisight.posterior.result import Posterior
 from axisight.robot.axis_names import axis_number
 from axisight.storage import write_whole
 
@@ -360,6 +361,7 @@ class Diagnosis:
     less measured. Attributes are ``log``, ``role``, ``mode``, ``torque`` (``logged``, or not), and
     ``lowpass_hz`` where all signals are low-passed: by inverse dynamics.
     ``trace``: the comparisons and moves of the search, with every rule that changed a log-weight.
+    ``posterior``, if asked for: the joint distribution of the parameters of causes and simulator.
     """
 
     name: str
@@ -390,6 +392,7 @@ class Diagnosis:
     simulator: Reproduction | None = None
     signals: tuple[xr.Dataset, ...] = ()
     trace: Trace = field(default_factory=Trace)
+    posterior: Posterior | None = None
 
     @property
     def joints(self) -> tuple[str, ...]:

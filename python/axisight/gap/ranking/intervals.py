@@ -26,19 +26,33 @@ def intervals(
     Intervals stay within the bounds of the effect: no speed is below zero. ``sure``: as in `Hypothesis`, the narrowest
     that an interval may be.
     """
+    values = effect.parameters or {}
+    bounds = {p.name: (p.lower, p.upper) for p in effect_info(effect.name).parameters}
+    out = {}
+    for name, deviation in total_std(effect, free, std, sure).items():
+        spread = NORMAL_DEVIATIONS * deviation
+        lower, upper = bounds[name]
+        low, high = values[name] - spread, values[name] + spread
+        out[name] = Interval(values[name], max(low, lower), min(high, upper))
+    return out
+
+
+def total_std(
+    effect: Effect,
+    free: Sequence[str],
+    std: Mapping[str, float],
+    sure: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+) -> dict[str, float]:
+    """Return the standard deviations behind `intervals`, formula error included; arguments as there."""
     info = effect_info(effect.name)
     values = effect.parameters or {}
     neutral = {p.name: p.neutral for p in info.parameters if p.role == "amplitude"}
     share = info.formula.spread(len(free))
-    bounds = {p.name: (p.lower, p.upper) for p in info.parameters}
     out = {}
     for name in free:
         size = abs(values[name] - neutral.get(name, 0.0))
         known = max(std.get(name, 0.0), float(np.ptp(sure.get(name, 0.0))) / 2 / NORMAL_DEVIATIONS)
-        spread = NORMAL_DEVIATIONS * float(np.hypot(known, share * size))
-        lower, upper = bounds[name]
-        low, high = values[name] - spread, values[name] + spread
-        out[name] = Interval(values[name], max(low, lower), min(high, upper))
+        out[name] = float(np.hypot(known, share * size))
     return out
 
 
@@ -84,12 +98,23 @@ def _with_own_scatter(cause: NamedCause, tolerated: Callable[[Effect], float]) -
         return cause
     first = info.parameters[0]
     told = cause.parameters[first.name]
-    scatter = tolerated(Effect(cause.effect, cause.axis, {first.name: told.value})) / 3
-    if info.stands_for[1] == "relative":
-        scatter *= 1 + told.value
+    effect = Effect(cause.effect, cause.axis, {first.name: told.value})
+    scatter = own_scatter_std(effect, tolerated)
     low, high = (
         told.value + sign * float(np.hypot(reach - told.value, NORMAL_DEVIATIONS * scatter))
         for sign, reach in ((-1, told.low), (1, told.high))
     )
     wider = Interval(told.value, max(low, first.lower), min(high, first.upper))
     return replace(cause, parameters={**cause.parameters, first.name: wider})
+
+
+def own_scatter_std(effect: Effect, tolerated: Callable[[Effect], float]) -> float:
+    """Return the tolerance, one standard deviation, of the own parameter that an effect changes; zero without one.
+
+    It belongs to the first parameter of the effect. ``tolerated`` as in `with_own_scatter`.
+    """
+    info = effect_info(effect.name)
+    if info.stands_for is None or effect.axis is None:
+        return 0.0
+    scatter = tolerated(effect) / 3
+    return scatter * (1 + effect.values()[0]) if info.stands_for[1] == "relative" else scatter

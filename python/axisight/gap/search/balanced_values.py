@@ -85,7 +85,7 @@ def deviations(model: FittedModel) -> dict[tuple[int | None, str], float]:
     The variance of the tolerances is added. The result is scaled by the ratio of Student's to the normal quantile, so
     that intervals can be made as for a normal distribution.
     """
-    stretch = _stretches(model)
+    stretch = stretches(model)
     count = int(stretch.max()) + 1
     if count < _BLOCKS:
         return dict(model.std)
@@ -112,7 +112,7 @@ def deviations(model: FittedModel) -> dict[tuple[int | None, str], float]:
     }
 
 
-def _stretches(model: FittedModel) -> NDArray[np.int64]:
+def stretches(model: FittedModel) -> NDArray[np.int64]:
     """Return the number of the stretch of time of every block (n_blocks,), the same on all axes."""
     place = np.zeros(len(model.axis), dtype=np.int64)
     for log in np.unique(model.log):

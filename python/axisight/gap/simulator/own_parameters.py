@@ -63,6 +63,12 @@ def _places(robot: Robot) -> dict[str, _Place]:
     return out
 
 
+def place_of(robot: Robot, name: str) -> tuple[str, str] | None:
+    """Return the effect and its parameter that an own parameter is in the core; None if it is one of the robot."""
+    place = _places(robot).get(name)
+    return None if place is None else (place.effect, place.parameter)
+
+
 def constant_name(robot: Robot, axis: int) -> str:
     """Return the name of the torque constant of an axis (from 1)."""
     return f"{robot.axis_names[axis - 1]}.{_CONSTANT}"

@@ -1,0 +1,1 @@
+"""Joint uncertainty of a finished diagnosis: covariance, rivals, variation between runs, held-out torque."""

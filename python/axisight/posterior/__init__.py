@@ -1,0 +1,33 @@
+"""The posterior of a diagnosis: joint distribution of its parameters, samples, files, ranges for training."""
+
+from axisight.posterior.between_runs import BetweenRuns
+from axisight.posterior.corner import plot_corner
+from axisight.posterior.data_tree import from_datatree, to_datatree
+from axisight.posterior.files import load_posterior, save_posterior
+from axisight.posterior.parameter import DrivenAxis, PosteriorParameter
+from axisight.posterior.randomization import (
+    PROJECTS,
+    Randomization,
+    RandomizedField,
+    randomization,
+)
+from axisight.posterior.result import Posterior, PosteriorHypothesis
+from axisight.posterior.sampled_robot import sampled_robot
+
+__all__ = [
+    "PROJECTS",
+    "BetweenRuns",
+    "DrivenAxis",
+    "Posterior",
+    "PosteriorHypothesis",
+    "PosteriorParameter",
+    "Randomization",
+    "RandomizedField",
+    "from_datatree",
+    "load_posterior",
+    "plot_corner",
+    "randomization",
+    "sampled_robot",
+    "save_posterior",
+    "to_datatree",
+]

@@ -1,0 +1,95 @@
+"""`axisight randomize`, and `diagnose --posterior`: tables, files, misuse."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from axisight.cli import app
+from axisight.cli import outputs as module
+from axisight.errors import MissingExtraError
+from axisight.posterior import load_posterior, save_posterior
+from gap_data import bare_axis, bare_case, log_of, reference, scattered
+from posterior_data import two_hypotheses
+
+
+def run(*arguments: str | Path, status: int = 0) -> str:
+    done = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert done.exit_code == status, (done.output, done.exception)
+    return " ".join(done.output.split())
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    return save_posterior(two_hypotheses(), tmp_path_factory.mktemp("made") / "v.nc", draws=10)
+
+
+def test_without_a_project_it_says_what_is_known(made):
+    said = run("randomize", made)
+    assert "correlated: coulomb_friction@1.coulomb_nm and axis1.viscous_friction (-0.78)" in said
+    assert "open: torque_offset@1, weight 0.25" in said
+    assert "open, without values here: sensor_delay@1: no log tells it from another" in said
+
+
+def test_with_a_project_it_writes_code_and_says_what_has_no_home(made, tmp_path):
+    out, plot = tmp_path / "dr.py", tmp_path / "corner.svg"
+    said = run("randomize", made, "--for", "isaaclab", "-o", out, "--plot", plot)
+    assert "no home: axis1.stiffness: the gears of such a model are rigid" in said
+    compile(out.read_text("utf-8"), "dr.py", "exec")
+    assert plot.read_text("utf-8").startswith("<?xml")
+    elastic = run("randomize", made, "--for", "mjlab", "--elastic-gears")
+    assert "gear_stiffness" in elastic and "no home: axis1.stiffness" not in elastic
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["-o", "dr.py"], "--out: expected --for beside it"),
+        (
+            ["--for", "mjlabs"],
+            "--for: expected one of mjlab, playground, isaaclab, got 'mjlabs'. Did you mean",
+        ),
+        (["--for", "mjlab", "-o", "notes.txt"], "notes.txt exists"),
+    ],
+)
+def test_misuse(made, tmp_path, monkeypatch, arguments, says):
+    monkeypatch.chdir(tmp_path)
+    Path("notes.txt").write_text("mine")
+    assert says in run("randomize", made, *arguments, status=2)
+    assert Path("notes.txt").read_text() == "mine"
+
+
+def test_a_file_that_is_none(tmp_path):
+    (tmp_path / "v.nc").write_text("no")
+    assert "expected a posterior of axisight" in run("randomize", tmp_path / "v.nc", status=2)
+    assert "No such file" in run("randomize", tmp_path / "gone.nc", status=2)
+
+
+def test_a_missing_library_stops_a_diagnosis_before_the_work(tmp_path, monkeypatch):
+    def missing() -> None:
+        raise MissingExtraError("NetCDF files need h5netcdf")
+
+    machine = bare_axis()
+    logs = [
+        log_of(machine, [], reference("multisine", k, 3000, machine.sample_time_s), k, f"log{k}")
+        for k in range(2)
+    ]
+    case = bare_case(tmp_path / "case", logs)
+    monkeypatch.setattr(module, "check_library", missing)
+    assert "need h5netcdf" in run("diagnose", case, "--posterior", tmp_path / "v.nc", status=2)
+
+
+def test_a_diagnosis_writes_its_posterior(tmp_path):
+    machine = scattered(bare_axis(), 4)
+    logs = [
+        log_of(machine, [], reference("multisine", k, 6000, machine.sample_time_s), k, f"log{k}")
+        for k in range(3)
+    ]
+    case, out = bare_case(tmp_path / "case", logs), tmp_path / "v.nc"
+    said = run("diagnose", case, "--posterior", out)
+    assert f"posterior: {out}".replace(" ", "") in said.replace(" ", "")
+    assert "% of held-out torque" in said
+    found = load_posterior(out)
+    assert found.verdict == "none" and 0.93 < found.held_out[0].attrs["inside"] < 0.97
