@@ -15,7 +15,7 @@ from axisight.gap.fit.time_limit import TimeLimit
 from axisight.gap.intake.given import Given, check_options, given_inputs
 from axisight.gap.intake.prepared_logs import behind_gate
 from axisight.gap.measure.by_axis import believed_by_axis
-from axisight.gap.measure.torque_traces import signals_of
+from axisight.gap.modelled.on_request import Requested, with_requested
 from axisight.gap.screening.search_round import Progress
 from axisight.gap.search.balanced_values import with_balanced_values
 from axisight.gap.search.reported_torque import with_constants_told
@@ -55,6 +55,7 @@ def diagnose(
     within: ExperimentLimits | None = None,
     signals: bool = False,
     simulated: LogsLike = (),
+    remainder: bool = False,
 ) -> Diagnosis:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks.
 
@@ -102,7 +103,8 @@ def diagnose(
     check_options(settings)
     given = given_inputs(case, logs, robot, estimation, validation, simulated, columns)
     asked = Asking(separate, to_show, within)
-    found = _diagnosed(given, name or given.name, settings or Settings(), progress, asked, signals)
+    wanted = Requested(signals, remainder)
+    found = _diagnosed(given, name or given.name, settings or Settings(), progress, asked, wanted)
     return replace(found, checks=(*given.says, *found.checks))
 
 
@@ -121,7 +123,7 @@ def _diagnosed(
     chosen: Settings,
     progress: Progress,
     asking: Asking,
-    signals: bool,
+    requested: Requested,
 ) -> Diagnosis:
     """Return the diagnosis of a simulator and logs with roles."""
     started, limit = time.monotonic(), TimeLimit(chosen.time_limit_s)
@@ -170,9 +172,8 @@ def _diagnosed(
         keep = bool(unknown) and out.verdict == "undecidable"
         out = asked.added(out, view, seen.found, keep=keep)
         progress("designing an experiment", 1, 1)
-    if signals:
-        after = seen.reach.simulator
-        out = replace(out, signals=signals_of(view, held_logs, after, logged=commanded is None))
+    after, logged = seen.reach.simulator, commanded is None
+    out = with_requested(out, requested, view, held_logs, after, chosen, logged=logged)
     checks = (*out.checks, *inputs.says(view.mode, view.compared))
     found_faults = (*inputs.constants(out.refit), *out.findings)
     out = replace(out, simulator=inputs.simulator, checks=checks, findings=found_faults)

@@ -1,8 +1,9 @@
 """A remainder that is modelled: smooth functions for the torque that no law of the library explains."""
 
 from axisight.remainder.fitting import fit_remainder
+from axisight.remainder.judgement import ModelledRemainder
 from axisight.remainder.model import Remainder
 from axisight.remainder.records import Motion, Record
 from axisight.remainder.terms import Term
 
-__all__ = ["Motion", "Record", "Remainder", "Term", "fit_remainder"]
+__all__ = ["ModelledRemainder", "Motion", "Record", "Remainder", "Term", "fit_remainder"]

@@ -14,7 +14,7 @@ from axisight.remainder.candidates import Candidate, candidates, periodic
 from axisight.remainder.folds import Folds, folds_of
 from axisight.remainder.hints import hint_of
 from axisight.remainder.model import Remainder
-from axisight.remainder.penalised import Block, Joint, block, correlated
+from axisight.remainder.penalised import Block, Joint, block, correlated, orthonormal
 from axisight.remainder.records import Record
 from axisight.remainder.selection import Chosen, Limits, select
 from axisight.remainder.splines import basis
@@ -99,8 +99,9 @@ class _Axis:
 
     def __post_init__(self) -> None:
         k = self.axis
-        weights = [np.ones(r.residual_nm.shape) if r.weight is None else r.weight for r in self.records]
-        self.weight = np.concatenate([w[:: self.steps, k] for w in weights])
+        self.weight = self._joined([r.weight for r in self.records])
+        own = [r.certainty if r.certainty is not None else r.weight for r in self.records]
+        self.certainty = self._joined(own)
         residual = np.concatenate([r.residual_nm[:: self.steps, k] for r in self.records])
         self.residual = self.weight * residual
         top = max(float(np.abs(r.motion.velocity_rad_s[:, k]).max()) for r in self.records)
@@ -150,12 +151,21 @@ class _Axis:
             )
         return out
 
+    def _joined(self, arrays: Sequence[Array | None]) -> Array:
+        """Return weights (n,) of the samples that are used; 1 where a record has none."""
+        parts = []
+        for record, array in zip(self.records, arrays, strict=True):
+            every = np.ones(record.residual_nm.shape) if array is None else array
+            parts.append(every[:: self.steps, self.axis])
+        return np.concatenate(parts)
+
     def _protected(self) -> Array:
+        """Return an orthonormal basis (n, r) of the protected torques, with the weights of their own fit."""
         parts = [r.protected for r in self.records]
         if any(p is None for p in parts):
             return np.zeros((len(self.residual), 0))
         columns = np.concatenate([p[:: self.steps, self.axis] for p in parts if p is not None])
-        return np.asarray(self.weight[:, None] * columns)
+        return orthonormal(self.certainty[:, None] * columns)
 
     def _blocks(self, offered: object) -> list[tuple[Candidate, Block]]:
         out = []
@@ -166,7 +176,8 @@ class _Axis:
                     for r in self.records
                 ]
             )
-            made = block(self.weight[:, None] * columns, candidate.penalty(), self.protected)
+            shared = self.protected.T @ (self.certainty[:, None] * columns)
+            made = block(self.weight[:, None] * columns, candidate.penalty(), shared)
             if made is not None:
                 out.append((candidate, made))
         return out

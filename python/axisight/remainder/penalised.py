@@ -35,15 +35,17 @@ class Block:
         return Block(self.columns, smoothing * size * self.penalty, self.free)
 
 
-def block(columns: Array, penalty: Array, protected: Array) -> Block | None:
-    """Return the block of weighted columns (n, m) orthogonal to protected ones (n, p); None if nothing is left."""
+def block(columns: Array, penalty: Array, shared: Array) -> Block | None:
+    """Return the block of weighted columns (n, m); None if nothing is left.
+
+    ``shared`` (p, m): products of the columns with what is protected, which free coefficients make zero.
+    """
     scale = np.sqrt(np.sum(columns**2))
     if scale <= 0:
         return None
     free = np.eye(columns.shape[1])
-    if protected.shape[1]:
-        shared = orthonormal(protected).T @ (columns / scale)
-        free = scipy.linalg.null_space(shared, rcond=_NULL)
+    if np.any(shared):
+        free = scipy.linalg.null_space(shared / scale, rcond=_NULL)
     left = columns @ free
     if not free.shape[1] or np.sqrt(np.sum(left**2)) < _NULL * scale:
         return None

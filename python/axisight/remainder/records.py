@@ -118,7 +118,8 @@ class Record:
 
     ``residual_nm`` (n, n_axes): measured minus simulated torque [Nm]. ``weight`` (n, n_axes): weight of each error,
     1 by default. ``protected`` (n, n_axes, p): torques by unit of each parameter of the causes, from which the
-    remainder must take nothing. ``lowpass``: the low-pass that ``residual_nm`` has passed, for arrays (n, m).
+    remainder must take nothing: it is orthogonal to them, with the weights ``certainty`` (n, n_axes) of the fit that
+    found the causes (by default ``weight``). ``lowpass``: the low-pass that ``residual_nm`` has passed, for arrays (n, m).
     Raises InputError when shapes disagree.
     """
 
@@ -126,12 +127,13 @@ class Record:
     residual_nm: Array
     weight: Array | None = None
     protected: Array | None = None
+    certainty: Array | None = None
     lowpass: Callable[[Array], Array] | None = None
 
     def __post_init__(self) -> None:
         """Check the shapes."""
         shape = self.motion.position_rad.shape
-        for field in ("residual_nm", "weight"):
+        for field in ("residual_nm", "weight", "certainty"):
             values = getattr(self, field)
             if values is not None and values.shape != shape:
                 raise InputError(f"{field}: expected shape {shape}, got {values.shape}")

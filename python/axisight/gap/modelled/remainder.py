@@ -1,0 +1,114 @@
+"""Fits the remainder of a diagnosis on its estimation logs and judges it on its validation logs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from axisight.gap.facts.result import Diagnosis
+from axisight.gap.facts.settings import Settings
+from axisight.gap.facts.simulator_variant import Variant
+from axisight.gap.facts.wording import percent
+from axisight.gap.measure.gap_figures import Stage, stage
+from axisight.gap.modelled.nearest_law import with_nearest_laws
+from axisight.gap.modelled.records import records_of
+from axisight.gap.search.search import refitted
+from axisight.gap.signals.standstill import standing
+from axisight.gap.views.inverse_dynamics import InverseView
+from axisight.gap.views.view import View
+from axisight.logs import Log
+from axisight.remainder import ModelledRemainder, Record, Remainder, fit_remainder
+
+Array = NDArray[np.float64]
+
+_NO_TORQUE = "The remainder is not modelled: no torque was logged."
+_BY_INVERSE = (
+    "The remainder is modelled by inverse dynamics: in closed loop the controller turns a missing torque into "
+    "another error."
+)
+
+
+def _quiet(_label: str, _done: int, _total: int) -> None:
+    """Report nothing."""
+
+
+def with_modelled_remainder(
+    out: Diagnosis, view: View, held: Sequence[Log], after: Variant, settings: Settings
+) -> Diagnosis:
+    """Return the diagnosis with its remainder modelled; the verdict stays.
+
+    ``held``: the validation logs; ``after``: the simulator with the causes.
+    """
+    if out.remainder is None or view.by_targets:
+        return replace(out, checks=(*out.checks, _NO_TORQUE))
+    seen = view
+    checks = out.checks
+    if not isinstance(seen, InverseView):
+        seen = InverseView(view.robot, view.logs, settings, held, view.silent)
+        checks = (*checks, _BY_INVERSE)
+    fitted = fit_remainder(records_of(seen, seen.logs, after, seen.certainty))
+    if fitted.terms:
+        fitted = with_nearest_laws(fitted, seen, refitted(seen.fitter, _quiet))
+    modelled = judged(fitted, seen, held, after)
+    return replace(
+        out,
+        headline=f"{out.headline} {_told(modelled)}",
+        remainder=replace(out.remainder, modelled=modelled),
+        checks=checks,
+    )
+
+
+def judged(
+    fitted: Remainder, view: InverseView, held: Sequence[Log], after: Variant
+) -> ModelledRemainder:
+    """Return a remainder with the gap on validation logs without and with it, as `Gap` has it."""
+    records = records_of(view, held, after)
+    measured = [view.measured(log) for log in held]
+    moves = [still < 0.5 for still in standing([view.filtering(log) for log in held])]
+
+    def gaps(torques: Sequence[Array]) -> tuple[Stage, Stage]:
+        left = [_error(r, t) for r, t in zip(records, torques, strict=True)]
+        moving = [e * m / np.sqrt(np.maximum(m.mean(axis=0), 1e-9)) for e, m in zip(left, moves, strict=True)]
+        whole, part = (
+            stage(held, errors, view.settings.block_s, measured, view.silent)
+            for errors in (left, moving)
+        )
+        return whole, part
+
+    none = [np.zeros_like(r.residual_nm) for r in records]
+    before, with_it = gaps(none), gaps([r.filtered(fitted.torque(r.motion)) for r in records])
+    (whole, moving), (whole_after, moving_after) = before, with_it
+    return ModelledRemainder(
+        model=fitted,
+        gap_before=_root(whole.mean()),
+        gap_after=_root(whole_after.mean()),
+        before_per_axis=_per_axis(whole),
+        after_per_axis=_per_axis(whole_after),
+        moving_before=_root(moving.mean()),
+        moving_after=_root(moving_after.mean()),
+    )
+
+
+def _error(record: Record, torque_nm: Array) -> Array:
+    weight = np.ones(1) if record.weight is None else record.weight
+    return np.asarray(weight * (record.residual_nm - torque_nm))
+
+
+def _root(square: float) -> float:
+    return float(np.sqrt(square))
+
+
+def _per_axis(of: Stage) -> Array:
+    return np.asarray(np.sqrt(np.mean(of.per_log(), axis=0)))
+
+
+def _told(modelled: ModelledRemainder) -> str:
+    if not modelled.model.terms:
+        return "The remainder follows no variable that a model could carry to other motions."
+    return (
+        f"Remainder modelled: from {percent(modelled.gap_before)} to {percent(modelled.gap_after)} on the "
+        f"validation logs."
+    )
