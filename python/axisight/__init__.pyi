@@ -12,6 +12,7 @@ from . import (
     mujoco,
     paths,
     records,
+    remainder,
     responses,
     rigid_body,
     robot_export,
@@ -71,6 +72,9 @@ from .logs import (
     check_log,
     read_case,
     read_log,
+)
+from .remainder.plots import (
+    plot_remainder,
 )
 from .report.forest import (
     plot_parameters,
@@ -141,12 +145,14 @@ __all__ = [
     "plot_overlay",
     "plot_parameters",
     "plot_ranking",
+    "plot_remainder",
     "plot_response_matrix",
     "plot_simulation",
     "progress_bars",
     "read_case",
     "read_log",
     "records",
+    "remainder",
     "resolver_ripple",
     "responses",
     "rigid_body",

@@ -130,6 +130,22 @@ def diagnose_command(
             help="Write measured and simulated torques of all logs, before and after: .parquet or .mcap.",
         ),
     ] = None,
+    with_remainder: Annotated[
+        bool,
+        typer.Option(
+            "--with-remainder",
+            help="Also model what the causes leave: smooth functions of speed, load and other variables, judged on "
+            "the validation logs.",
+        ),
+    ] = False,
+    remainder_table: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="TOML",
+            rich_help_panel=OUTPUT,
+            help="Write the modelled remainder here as a table, for a simulator. Needs --with-remainder.",
+        ),
+    ] = None,
     exit_code: Annotated[
         bool,
         typer.Option(
@@ -283,6 +299,8 @@ def diagnose_command(
             "--signals": signals,
             "--simulated": simulated,
             "--explain": explain,
+            "--with-remainder": with_remainder,
+            "--remainder-table": remainder_table,
             "--verbose": verbose,
             "--force": force,
             "--exit-code": exit_code,
@@ -331,8 +349,17 @@ def diagnose_command(
             max_bytes=max_bytes,
         )
         asked = None if experiment_on is None else experiment_on(inputs.robot)
+        if remainder_table is not None and not with_remainder:
+            raise InputError("--remainder-table: expected --with-remainder beside it, got none")
         outputs = Outputs(
-            json, report, write_model, signals, next_experiment, to_show is not None, force
+            json,
+            report,
+            write_model,
+            signals,
+            next_experiment,
+            to_show is not None,
+            force,
+            remainder_table,
         )
         outputs.check(inputs, [*inputs.files(), *_described(case_or_logs, columns)])
         settings = Settings(
@@ -358,6 +385,7 @@ def diagnose_command(
                 within=None if asked is None else asked.within,
                 signals=signals is not None,
                 simulated=inputs.simulated,
+                remainder=with_remainder,
             )
         show_diagnosis(found, verbose=verbose, given=outputs.given())
         if explain:

@@ -13,6 +13,7 @@ from axisight.cli.outcomes import (
     diagnosis_writes,
     write_found_experiment,
     write_found_model,
+    write_found_remainder,
     write_found_signals,
 )
 from axisight.cli.screen import is_output
@@ -26,6 +27,7 @@ _RESULTS = {
     "--json": (".json",),
     "--report": (".html", ".htm"),
     "--signals": (".parquet", ".mcap"),
+    "--remainder-table": (".toml",),
     "--write-model": (),
 }
 
@@ -44,6 +46,7 @@ class Outputs:
     next_experiment: Path | None
     to_show: bool
     force: bool
+    remainder: Path | None = None
 
     def given(self) -> list[str]:
         """Return the given options, each of which prints a line when its file is written."""
@@ -52,6 +55,7 @@ class Outputs:
             "--report": self.report,
             "--write-model": self.model,
             "--signals": self.signals,
+            "--remainder-table": self.remainder,
             "--next-experiment": self.next_experiment,
         }
         return [option for option, path in files.items() if path is not None]
@@ -67,6 +71,7 @@ class Outputs:
             "--report": self.report,
             "--write-model": self.model,
             "--signals": self.signals,
+            "--remainder-table": self.remainder,
         }
         if self.next_experiment is not None:
             for path in experiment_files(self.next_experiment):
@@ -90,4 +95,6 @@ class Outputs:
             out.append(made)
         if self.signals is not None:
             out.append(partial(write_found_signals, found, self.signals))
+        if self.remainder is not None:
+            out.append(partial(write_found_remainder, found, self.remainder))
         return out

@@ -25,7 +25,8 @@ class Motion:
 
     ``time_s`` (n,) [s], ``position_rad`` [rad], ``velocity_rad_s`` [rad/s], ``acceleration_rad_s2`` [rad/s^2],
     ``load_nm``: torque through the gear without rotor and friction [Nm], ``temperature_c`` [degC]; None if it was
-    not logged. On an axis that slides, rad reads m and Nm reads N. Raises InputError when shapes disagree.
+    not logged. ``followed``: travel and direction as in `travel_rad` and `way`, of a motion that was followed from an
+    earlier moment; by default they are followed from the first sample. On an axis that slides, rad reads m and Nm reads N. Raises InputError when shapes disagree.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Motion:
     acceleration_rad_s2: Array
     load_nm: Array
     temperature_c: Array | None = None
+    followed: tuple[Array, Array] | None = None
 
     def __post_init__(self) -> None:
         """Check the shapes."""
@@ -57,6 +59,8 @@ class Motion:
 
     @cached_property
     def _followed(self) -> tuple[Array, Array]:
+        if self.followed is not None:
+            return self.followed
         least = _REVERSES * np.ptp(self.position_rad, axis=0)
         tracker = Travel(least)
         travel = np.empty(self.position_rad.shape)
@@ -92,7 +96,11 @@ class Travel:
 
     def __init__(self, least_rad: Array) -> None:
         self._least = least_rad
-        self._way = np.zeros(len(least_rad))
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget the motion so far."""
+        self._way = np.zeros(len(self._least))
         self._turned = np.zeros(0)
         self._farthest = np.zeros(0)
 
