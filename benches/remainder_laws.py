@@ -38,7 +38,7 @@ TORQUE_NOISE, ANGLE_NOISE_RAD = 0.01, 1e-4
 
 @dataclass(frozen=True)
 class State:
-    """What laws depend on, (n, n_axes) each, motor side: angles over their amplitude, speeds over their largest."""
+    """What laws depend on, (n, n_axes) each, motor side: angles over their amplitude, all else over round figures."""
 
     time_s: Array
     angle: Array
@@ -139,9 +139,9 @@ LAWS = (
         (("acceleration", 2),),
     ),
     Law(
-        "friction of lifted loads only",
+        "friction of loads in one direction only",
         3,
-        lambda s: sign(s.speed[:, 2]) * np.maximum(s.load[:, 2], 0) ** 2,
+        lambda s: np.maximum(sign(s.speed[:, 2]), 0) * s.load[:, 2] ** 2,
         (("load", 3),),
     ),
     Law(
@@ -260,14 +260,16 @@ def state_of(robot: Robot, joint_rad: Array, temperature_c: Array) -> tuple[Stat
         joint_rad / AMPLITUDE,
         speed / TOP_RAD_S,
         acceleration / TOP_RAD_S2,
-        load / load.std(axis=0),
+        load / TOP_LOAD_NM,
         temperature_c,
         angle,
     )
     return state, torque
 
 
+# Round figures that the motions nearly reach: speeds and accelerations of the motors, loads of the gears.
 TOP_RAD_S, TOP_RAD_S2 = np.array([150.0, 110.0, 120.0]), np.array([300.0, 250.0, 250.0])
+TOP_LOAD_NM = np.array([4.0, 40.0, 25.0])
 
 
 def logs_of(robot: Robot, law: Law, seed: int) -> tuple[list[Log], list[Log]]:

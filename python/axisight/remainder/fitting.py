@@ -64,8 +64,11 @@ def fit_remainder(
     folds = folds_of(given, steps)
     axes = [_Axis(given, axis, steps, folds) for axis in range(given[0].motion.n_axes)]
     fitted = [axis.fitted(limits) for axis in axes]
-    terms = tuple(term for found, _ in fitted for term in found)
-    return Remainder(terms, np.array([limit for _, limit in fitted]))
+    return Remainder(
+        tuple(term for axis in fitted for term in axis.terms),
+        np.array([axis.limit_nm for axis in fitted]),
+        np.array([axis.held_out_nm for axis in fitted]),
+    )
 
 
 def _check(
@@ -88,6 +91,15 @@ def _check(
         raise InputError(f"significance: expected a positive number, got {significance}")
 
 
+@dataclass(frozen=True)
+class _Fitted:
+    """The terms of an axis, the largest torque of their sum along the records, and the rms held-out error [Nm]."""
+
+    terms: list[Term]
+    limit_nm: float
+    held_out_nm: float
+
+
 @dataclass(eq=False)
 class _Axis:
     """The data of one axis (from 0): every ``steps``-th sample, weighted."""
@@ -108,10 +120,10 @@ class _Axis:
         self.corner = CORNER * top
         self.protected = self._protected()
 
-    def fitted(self, limits: Limits) -> tuple[list[Term], float]:
-        """Return the terms, and the largest torque [Nm] of their sum along the records."""
+    def fitted(self, limits: Limits) -> _Fitted:
+        """Return the terms of the axis."""
         if not np.any(self.residual):
-            return [], 0.0
+            return _Fitted([], 0.0, 0.0)
         fixed = self._blocks(candidates(self.records, self.axis))
 
         def offered(left: Array) -> list[tuple[Candidate, Block]]:
@@ -121,12 +133,13 @@ class _Axis:
             )
             return [*fixed, *self._blocks(waves)]
 
-        chosen = select(self.residual, self.folds, offered, limits)
+        chosen, squares = select(self.residual, self.folds, offered, limits)
+        held_out = float(np.sqrt(np.mean(squares)))
         if not chosen:
-            return [], 0.0
+            return _Fitted([], 0.0, held_out)
         terms = self._terms(chosen)
         torque = np.concatenate([sum(t.torque(r.motion) for t in terms) for r in self.records])
-        return terms, float(np.abs(torque).max())
+        return _Fitted(terms, float(np.abs(torque).max()), held_out)
 
     def _thinned(self) -> list[Record]:
         """Return the records with the samples that are used, for positions and speeds."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from axisight.remainder.model import Remainder
 from axisight.remainder.terms import Term
 
 Array = NDArray[np.float64]
+OwnParameters = Literal["re-fitted", "stated"]
 
 
 @summarized
@@ -21,7 +22,8 @@ class ModelledRemainder:
     """A remainder judged on validation logs by inverse dynamics.
 
     ``gap_before``, ``gap_after``: relative torque error with the causes, without and with the remainder, rms over
-    axes and logs [1]; the same by axis (n_axes,). ``moving_before``, ``moving_after``: of the samples in motion [1].
+    axes and logs [1]; the same by axis (n_axes,). ``own_parameters``: ``"re-fitted"``, or ``"stated"`` where the
+    remainder belongs to the simulator with its stated own parameters. ``moving_before``, ``moving_after``: of the samples in motion [1].
     """
 
     model: Remainder
@@ -31,10 +33,12 @@ class ModelledRemainder:
     after_per_axis: Array
     moving_before: float
     moving_after: float
+    own_parameters: OwnParameters = "re-fitted"
 
     def to_dict(self) -> dict[str, Any]:
         """Return what stands in the verdict."""
         return {
+            "own_parameters": self.own_parameters,
             "gap_before": self.gap_before,
             "gap_after": self.gap_after,
             "before_per_axis": self.before_per_axis.tolist(),

@@ -24,10 +24,12 @@ class Remainder:
 
     ``terms``: in the order of choice, axis by axis. ``limits_nm`` (n_axes,): largest size of the sum along the
     estimation data [Nm]; a larger torque is cut to it.
+    ``held_out_nm`` (n_axes,): rms error on held-out data, weighted as the records [Nm].
     """
 
     terms: tuple[Term, ...]
     limits_nm: Array
+    held_out_nm: Array
 
     @property
     def n_axes(self) -> int:

@@ -57,8 +57,8 @@ def select(
     folds: Folds,
     blocks: Callable[[Array], Sequence[tuple[Candidate, Block]]],
     limits: Limits,
-) -> list[Chosen]:
-    """Return the chosen terms of a weighted residual (n,), in the order of choice.
+) -> tuple[list[Chosen], Array]:
+    """Return the chosen terms of a weighted residual (n,), in the order of choice, and squared held-out errors (n,).
 
     ``blocks``: candidates with their blocks, given what the chosen terms leave of the residual (n,).
     """
@@ -78,7 +78,7 @@ def select(
             break
         chosen.append(term)
         squares = taken.squares
-    return chosen
+    return chosen, squares
 
 
 def _enough(term: Chosen, before: Array, after: Array, limits: Limits) -> bool:

@@ -18,7 +18,7 @@ _POINTS = 61
 # Share of the samples beyond each end of the range; a spline has too few data there.
 _BEYOND = 0.002
 # Share of the constant in the penalty, so that every system of equations has one solution.
-_RIDGE = 1e-6
+_RIDGE = 1e-2
 
 
 @dataclass(frozen=True)

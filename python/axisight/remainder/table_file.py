@@ -43,7 +43,8 @@ def save_remainder(remainder: Remainder, path: Path | str, *, overwrite: bool = 
     for line in _HEAD.splitlines():
         document.add(tomlkit.comment(line))
     document["schema"] = SCHEMA
-    document["limits_nm"] = [_rounded(x) for x in remainder.limits_nm.tolist()]
+    for name in ("limits_nm", "held_out_nm"):
+        document[name] = [_rounded(x) for x in getattr(remainder, name).tolist()]
     terms = tomlkit.aot()
     for term in remainder.terms:
         table = tomlkit.table()
@@ -78,11 +79,13 @@ def load_remainder(path: Path | str) -> Remainder:
         raise InputError(f"{path}: expected a remainder table in TOML: {error}") from None
     if given.get("schema") != SCHEMA:
         raise InputError(f"{path}: schema: expected {SCHEMA!r}, got {given.get('schema')!r}")
-    limits = _numbers(path, given, "limits_nm")
+    limits, held_out = (_numbers(path, given, name) for name in ("limits_nm", "held_out_nm"))
+    if limits.shape != held_out.shape:
+        raise InputError(f"{path}: held_out_nm: expected as many numbers as limits_nm")
     terms = given.get("term", [])
     if not isinstance(terms, list):
         raise InputError(f"{path}: term: expected [[term]] tables, got {type(terms).__name__}")
-    return Remainder(tuple(_term(path, one, len(limits)) for one in terms), limits)
+    return Remainder(tuple(_term(path, one, len(limits)) for one in terms), limits, held_out)
 
 
 def _term(path: Path | str, given: Mapping[str, Any], n_axes: int) -> Term:

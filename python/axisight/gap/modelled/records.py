@@ -101,8 +101,11 @@ def _changes(robot: Robot, after: Variant) -> list[_Change]:
     plain = (robot, after)
     out: list[_Change] = []
     for effect in after.effects:
+        table = {p.name: p for p in effect_info(effect.name).parameters}
         for name, value in (effect.parameters or {}).items():
             step = _STEP * value
+            # Away from a bound at which the value may stand.
+            step = step if table[name].lower <= value + step <= table[name].upper else -step
             if step:
                 changed = effect.with_values({name: value + step})
                 others = tuple(e for e in after.effects if e.label != effect.label)

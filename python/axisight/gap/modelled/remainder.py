@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects import Effect
 from axisight.gap.facts.result import Diagnosis
 from axisight.gap.facts.settings import Settings
 from axisight.gap.facts.simulator_variant import Variant
@@ -49,10 +50,10 @@ def with_modelled_remainder(
     if not isinstance(seen, InverseView):
         seen = InverseView(view.robot, view.logs, settings, held, view.silent)
         checks = (*checks, _BY_INVERSE)
-    fitted = fit_remainder(records_of(seen, seen.logs, after, seen.certainty))
+    fitted, base = _best_of(seen, after, tuple(cause.as_effect() for cause in out.causes))
     if fitted.terms:
         fitted = with_nearest_laws(fitted, seen, refitted(seen.fitter, _quiet))
-    modelled = judged(fitted, seen, held, after)
+    modelled = judged(fitted, seen, held, after, base)
     return replace(
         out,
         headline=f"{out.headline} {_told(modelled)}",
@@ -61,16 +62,44 @@ def with_modelled_remainder(
     )
 
 
+def _best_of(
+    view: InverseView, after: Variant, named: tuple[Effect, ...]
+) -> tuple[Remainder, Variant]:
+    """Return the remainder of the simulator with re-fitted or with stated own parameters, and that simulator.
+
+    A re-fit may bend own parameters until the rest follows no variable. The simulator counts that leaves less on
+    held-out data. ``named``: the causes of the verdict; ``after`` may have further effects, which did not carry over.
+    """
+    bases = [Variant({}, named)]
+    if after.robot_values:
+        bases.append(Variant(after.robot_values, named))
+    std = np.sqrt(np.mean([np.var(log.torque_nm, axis=0) for log in view.logs], axis=0))
+    fits = [
+        (fit_remainder(records_of(view, view.logs, base, view.certainty)), base) for base in bases
+    ]
+    judged = [i for i in range(len(std)) if i not in view.silent]
+    return min(fits, key=lambda fit: float(np.sum((fit[0].held_out_nm / std)[judged] ** 2)))
+
+
 def judged(
-    fitted: Remainder, view: InverseView, held: Sequence[Log], after: Variant
+    fitted: Remainder,
+    view: InverseView,
+    held: Sequence[Log],
+    after: Variant,
+    base: Variant | None = None,
 ) -> ModelledRemainder:
-    """Return a remainder with the gap on validation logs without and with it, as `Gap` has it."""
-    records = records_of(view, held, after)
+    """Return a remainder with the gap on validation logs without and with it, as `Gap` has it.
+
+    ``after``: the simulator with the causes; ``base``: that to which the remainder belongs, by default the same.
+    """
+    own = after if base is None else base
+    plain = records_of(view, held, after)
+    records = plain if own is after else records_of(view, held, own)
     measured = [view.measured(log) for log in held]
     moves = [still < 0.5 for still in standing([view.filtering(log) for log in held])]
 
-    def gaps(torques: Sequence[Array]) -> tuple[Stage, Stage]:
-        left = [_error(r, t) for r, t in zip(records, torques, strict=True)]
+    def gaps(of: Sequence[Record], torques: Sequence[Array]) -> tuple[Stage, Stage]:
+        left = [_error(r, t) for r, t in zip(of, torques, strict=True)]
         moving = [e * m / np.sqrt(np.maximum(m.mean(axis=0), 1e-9)) for e, m in zip(left, moves, strict=True)]
         whole, part = (
             stage(held, errors, view.settings.block_s, measured, view.silent)
@@ -78,8 +107,9 @@ def judged(
         )
         return whole, part
 
-    none = [np.zeros_like(r.residual_nm) for r in records]
-    before, with_it = gaps(none), gaps([r.filtered(fitted.torque(r.motion)) for r in records])
+    none = [np.zeros_like(r.residual_nm) for r in plain]
+    before = gaps(plain, none)
+    with_it = gaps(records, [r.filtered(fitted.torque(r.motion)) for r in records])
     (whole, moving), (whole_after, moving_after) = before, with_it
     return ModelledRemainder(
         model=fitted,
@@ -89,6 +119,7 @@ def judged(
         after_per_axis=_per_axis(whole_after),
         moving_before=_root(moving.mean()),
         moving_after=_root(moving_after.mean()),
+        own_parameters="re-fitted" if own.robot_values else "stated",
     )
 
 
