@@ -78,7 +78,8 @@ def travel(angle: Array) -> tuple[Array, Array]:
 
 def saw(phase: Array) -> Array:
     """Return a smooth saw tooth of period one."""
-    return sum(np.sin(2 * np.pi * k * phase) / k for k in (1, 2, 3))
+    k = np.arange(1, 4)
+    return np.asarray(np.sin(2 * np.pi * np.multiply.outer(phase, k)) @ (1 / k))
 
 
 def worn_in(s: State, rate: float) -> Array:
@@ -153,7 +154,7 @@ LAWS = (
     Law(
         "friction that a reversal builds up",
         2,
-        lambda s: (lambda g, w: w * (1 - np.exp(-g / 0.3)))(*travel(s.angle[:, 1])),
+        lambda s: travel(s.angle[:, 1])[1] - worn_in(s, 0.3),
         (("travel", 2),),
     ),
     Law("friction that wears in after a reversal", 2, lambda s: worn_in(s, 0.3), (("travel", 2),)),
@@ -220,7 +221,7 @@ def sums_of_sines(rng: np.random.Generator) -> Array:
         for k in range(1, 6):
             size, phase = rng.uniform(0.3, 1.0) / k, rng.uniform(0, 2 * np.pi)
             out[:, axis] += size * np.sin(2 * np.pi * k * t / RUN_S * 1.0 + phase)
-    return AMPLITUDE * out / np.abs(out).max(axis=0)
+    return np.asarray(AMPLITUDE * out / np.abs(out).max(axis=0))
 
 
 def point_to_point(rng: np.random.Generator) -> Array:
@@ -243,7 +244,7 @@ def point_to_point(rng: np.random.Generator) -> Array:
 def temperatures(rng: np.random.Generator, n: int) -> Array:
     """Return temperatures of the axes (n, 3) [degC] that rise during a run from a level of its own."""
     start, rise = rng.uniform(20, 40, 3), rng.uniform(4, 12, 3)
-    return start + rise * (1 - np.exp(-np.arange(n)[:, None] / (0.5 * n)))
+    return np.asarray(start + rise * (1 - np.exp(-np.arange(n)[:, None] / (0.5 * n))))
 
 
 def state_of(robot: Robot, joint_rad: Array, temperature_c: Array) -> tuple[State, Array]:

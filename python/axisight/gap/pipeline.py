@@ -172,8 +172,8 @@ def _diagnosed(
         keep = bool(unknown) and out.verdict == "undecidable"
         out = asked.added(out, view, seen.found, keep=keep)
         progress("designing an experiment", 1, 1)
-    after, logged = seen.reach.simulator, commanded is None
-    out = with_requested(out, requested, view, held_logs, after, chosen, logged=logged)
+    after, from_log = seen.reach.simulator, commanded is None
+    out = with_requested(out, requested, view, held_logs, after, chosen, logged=from_log)
     checks = (*out.checks, *inputs.says(view.mode, view.compared))
     found_faults = (*inputs.constants(out.refit), *out.findings)
     out = replace(out, simulator=inputs.simulator, checks=checks, findings=found_faults)

@@ -52,7 +52,9 @@ def apply_remainder(
     n = running.remainder.n_axes
     if len(axes.dofs) != n:
         raise InputError(f"joints: expected {n}, one for each axis, got {len(axes.dofs)}")
-    ratio, beside = (np.broadcast_to(np.asarray(x, np.float64), (n,)) for x in (gear_ratio, beside_nm))
+    ratio, beside = (
+        np.broadcast_to(np.asarray(x, np.float64), (n,)) for x in (gear_ratio, beside_nm)
+    )
     if not np.all(np.isfinite(ratio)) or np.any(ratio == 0):
         raise InputError(f"gear_ratio: expected numbers other than zero, got {ratio.tolist()}")
     load = gear_load(mujoco, model, data)[axes.dofs]

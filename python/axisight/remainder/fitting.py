@@ -128,9 +128,7 @@ class _Axis:
 
         def offered(left: Array) -> list[tuple[Candidate, Block]]:
             step_s = float(np.median(np.diff(self.records[0].motion.time_s))) * self.steps
-            waves = periodic(
-                self._thinned(), self.axis, self.weight * left, _SHOWS / step_s
-            )
+            waves = periodic(self._thinned(), self.axis, self.weight * left, _SHOWS / step_s)
             return [*fixed, *self._blocks(waves)]
 
         chosen, squares = select(self.residual, self.folds, offered, limits)
@@ -229,5 +227,3 @@ class _Axis:
                 period=None if scale is None else scale.period,
             )
         )
-
-

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,18 +33,18 @@ class Folds:
 
     def sums(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the sum of values (n,) in each block (n_blocks,)."""
-        return np.bincount(self.block, weights=values)
+        return np.asarray(np.bincount(self.block, weights=values), dtype=np.float64)
 
     def fold_sums(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the sum of values (n,) in each fold (n_folds,)."""
-        return np.bincount(self.fold, weights=values)
+        return np.asarray(np.bincount(self.fold, weights=values), dtype=np.float64)
 
 
 def folds_of(records: Sequence[Record], steps: int) -> Folds:
     """Return the folds of records of which every ``steps``-th sample is used."""
     lengths = [len(r.motion.time_s[::steps]) for r in records]
     ends = np.concatenate([[0], np.cumsum(lengths)])
-    parts = tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+    parts = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
     alone = len(records) == 1
     fold, block, first = [], [], 0
     for number, length in enumerate(lengths):

@@ -22,8 +22,9 @@ class ModelledRemainder:
     """A remainder judged on validation logs by inverse dynamics.
 
     ``gap_before``, ``gap_after``: relative torque error with the causes, without and with the remainder, rms over
-    axes and logs [1]; the same by axis (n_axes,). ``own_parameters``: ``"re-fitted"``, or ``"stated"`` where the
-    remainder belongs to the simulator with its stated own parameters. ``moving_before``, ``moving_after``: of the samples in motion [1].
+    axes and logs [1]; the same by axis (n_axes,). ``moving_before``, ``moving_after``: of the samples in motion [1].
+    ``own_parameters``: ``"re-fitted"``, or ``"stated"`` where the remainder belongs to the simulator with its stated
+    own parameters.
     """
 
     model: Remainder

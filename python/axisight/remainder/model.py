@@ -70,16 +70,23 @@ class Remainder:
             return out
 
         return xr.Dataset(
-            {
-                name: (("term", "point"), padded(name)) for name in ("x", "value", "standard_error")
-            }
+            {name: (("term", "point"), padded(name)) for name in ("x", "value", "standard_error")}
             | {
                 name: ("term", [getattr(t, name) for t in terms], {"units": "1"})
                 for name in ("gain", "significance")
             },
             coords={
                 name: ("term", [getattr(t, name) for t in terms])
-                for name in ("axis", "acts", "variable", "of_axis", "unit", "x_unit", "words", "hint")
+                for name in (
+                    "axis",
+                    "acts",
+                    "variable",
+                    "of_axis",
+                    "unit",
+                    "x_unit",
+                    "words",
+                    "hint",
+                )
             },
             attrs={"side": "motor"},
         )

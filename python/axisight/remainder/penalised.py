@@ -34,6 +34,14 @@ class Block:
         size = float(np.sum(self.columns**2)) / max(float(np.trace(self.penalty)), 1e-300)
         return Block(self.columns, smoothing * size * self.penalty, self.free)
 
+    def without(self, other: Array) -> Block | None:
+        """Return the block orthogonal to other columns (n, p); None if nothing is left."""
+        further = scipy.linalg.null_space(other.T @ self.columns, rcond=_NULL)
+        if not further.shape[1]:
+            return None
+        penalty = further.T @ self.penalty @ further
+        return Block(self.columns @ further, penalty, self.free @ further)
+
 
 def block(columns: Array, penalty: Array, shared: Array) -> Block | None:
     """Return the block of weighted columns (n, m); None if nothing is left.
@@ -55,7 +63,7 @@ def block(columns: Array, penalty: Array, shared: Array) -> Block | None:
 def orthonormal(columns: Array) -> Array:
     """Return an orthonormal basis (n, r) of columns (n, p), each at its own scale."""
     size = np.sqrt(np.sum(columns**2, axis=0))
-    used = columns[:, size > 0] / size[size > 0]
+    used = np.asarray(columns[:, size > 0] / size[size > 0])
     if not used.shape[1]:
         return used
     left, values, _ = np.linalg.svd(used, full_matrices=False)
@@ -100,7 +108,9 @@ class Joint:
         out = np.zeros(len(penalties))
         for mine, own, squares in grams:
             rest = np.stack([gram - mine + penalty for penalty in penalties])
-            found = np.linalg.solve(rest, np.broadcast_to(moment - own, (len(rest), len(own)))[..., None])[..., 0]
+            found = np.linalg.solve(
+                rest, np.broadcast_to(moment - own, (len(rest), len(own)))[..., None]
+            )[..., 0]
             out += squares - 2 * found @ own + np.einsum("ki,ij,kj->k", found, mine, found)
         return out
 
@@ -119,9 +129,7 @@ def correlated(error: Array, parts: Sequence[slice]) -> float:
     longest = max(part.stop - part.start for part in parts)
     total, lag = 1.0, 1
     while lag < longest // 2 and size > 0:
-        both = sum(
-            float(error[p][:-lag] @ error[p][lag:]) for p in parts if p.stop - p.start > lag
-        )
+        both = sum(float(error[p][:-lag] @ error[p][lag:]) for p in parts if p.stop - p.start > lag)
         if both <= 0:
             break
         total += 2 * both / size

@@ -26,7 +26,8 @@ class Motion:
     ``time_s`` (n,) [s], ``position_rad`` [rad], ``velocity_rad_s`` [rad/s], ``acceleration_rad_s2`` [rad/s^2],
     ``load_nm``: torque through the gear without rotor and friction [Nm], ``temperature_c`` [degC]; None if it was
     not logged. ``followed``: travel and direction as in `travel_rad` and `way`, of a motion that was followed from an
-    earlier moment; by default they are followed from the first sample. On an axis that slides, rad reads m and Nm reads N. Raises InputError when shapes disagree.
+    earlier moment; by default they are followed from the first sample. On an axis that slides, rad reads m and Nm
+    reads N. Raises InputError when shapes disagree.
     """
 
     name: str
@@ -127,8 +128,8 @@ class Record:
     ``residual_nm`` (n, n_axes): measured minus simulated torque [Nm]. ``weight`` (n, n_axes): weight of each error,
     1 by default. ``protected`` (n, n_axes, p): torques by unit of each parameter of the causes, from which the
     remainder must take nothing: it is orthogonal to them, with the weights ``certainty`` (n, n_axes) of the fit that
-    found the causes (by default ``weight``). ``lowpass``: the low-pass that ``residual_nm`` has passed, for arrays (n, m).
-    Raises InputError when shapes disagree.
+    found the causes (by default ``weight``). ``lowpass``: the low-pass that ``residual_nm`` has passed, for arrays
+    (n, m). Raises InputError when shapes disagree.
     """
 
     motion: Motion

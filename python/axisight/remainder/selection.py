@@ -69,7 +69,8 @@ def select(
         left = _left(y, kept)
         offered = [x for x in blocks(left) if not any(x[0] == c.candidate for c in chosen)]
         screened = sorted(offered, key=lambda x: _promise(left, folds, *x))
-        fits = [_best(y, folds, candidate, block, kept) for candidate, block in screened[:_TRIED]]
+        tried = _with_own_constants(screened, chosen)
+        fits = [_best(y, folds, candidate, block, kept) for candidate, block in tried]
         if not fits:
             break
         taken = _simplest(fits, folds)
@@ -79,6 +80,30 @@ def select(
         chosen.append(term)
         squares = taken.squares
     return chosen, squares
+
+
+_Offer = tuple[Candidate, Block]
+
+
+def _with_own_constants(screened: Sequence[_Offer], chosen: Sequence[Chosen]) -> list[_Offer]:
+    """Return the first candidates, with the constants that act alike.
+
+    Two functions with the same factor would share their constant, so one beside a chosen one is orthogonal to it.
+    """
+    constants = {
+        candidate.acts: offer for offer in screened if (candidate := offer[0]).scale is None
+    }
+    taken = {c.candidate.acts for c in chosen}
+    out: list[_Offer] = []
+    for candidate, block in screened[:_TRIED]:
+        constant = constants.get(candidate.acts)
+        if constant is None or candidate.scale is None:
+            out.append((candidate, block))
+        elif candidate.acts not in taken:
+            out += [(candidate, block), constant]
+        elif (left := block.without(constant[1].columns)) is not None:
+            out.append((candidate, left))
+    return list({candidate: (candidate, block) for candidate, block in out}.values())
 
 
 def _enough(term: Chosen, before: Array, after: Array, limits: Limits) -> bool:

@@ -37,7 +37,9 @@ def _figure(term: Term) -> dict[str, Any]:
     margin = NORMAL_DEVIATIONS * term.standard_error
     # A constant is drawn as a level line.
     x = term.x if len(term.x) > 1 else np.array([0.0, 1.0])
-    low, value, high = (np.broadcast_to(y, x.shape) for y in (term.value - margin, term.value, term.value + margin))
+    low, value, high = (
+        np.broadcast_to(y, x.shape) for y in (term.value - margin, term.value, term.value + margin)
+    )
     across, up = Scale.around(x), Scale.around(np.concatenate([low, high, [0.0]]), margin=0.06)
 
     def drawn(at: np.ndarray[Any, Any], y: np.ndarray[Any, Any]) -> str:

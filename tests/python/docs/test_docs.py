@@ -30,6 +30,7 @@ MODULES = (
     axisight.mujoco,
     axisight.paths,
     axisight.records,
+    axisight.remainder,
     axisight.responses,
     axisight.rigid_body,
     axisight.robot_file,

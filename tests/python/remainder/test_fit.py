@@ -145,10 +145,12 @@ def test_misuse_is_named() -> None:
         fit_remainder(records(coupled), smallest_gain=2.0)
     warm = records(coupled)
     lacking = fit_remainder(warm)
+    alone = replace(
+        at,
+        position_rad=at.position_rad[:, :1],
+        velocity_rad_s=at.velocity_rad_s[:, :1],
+        acceleration_rad_s2=at.acceleration_rad_s2[:, :1],
+        load_nm=at.load_nm[:, :1],
+    )
     with pytest.raises(InputError, match="expected 2 axes"):
-        lacking.torque(replace(at, **{k: v[:, :1] for k, v in _arrays(at).items()}))
-
-
-def _arrays(at: Motion) -> dict[str, Array]:
-    names = ("position_rad", "velocity_rad_s", "acceleration_rad_s2", "load_nm")
-    return {name: getattr(at, name) for name in names}
+        lacking.torque(alone)

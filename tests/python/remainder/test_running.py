@@ -50,7 +50,7 @@ def test_travel_is_that_since_the_last_reversal() -> None:
     zero = np.zeros_like(position)
     at = Motion(
         name="to and fro",
-        time_s=np.arange(len(position)) * 0.01,
+        time_s=np.linspace(0.0, 1.6, len(position)),
         position_rad=position,
         velocity_rad_s=zero,
         acceleration_rad_s2=zero,
@@ -64,9 +64,22 @@ def test_travel_is_that_since_the_last_reversal() -> None:
 def test_moment_by_moment_is_the_whole_motion(remainder: Remainder) -> None:
     at = motion(4)
     # The smallest way back of a whole motion is a share of its travel.
-    running = RunningRemainder(remainder, reverses_rad=3e-4 * float(np.ptp(at.position_rad, axis=0)[0]))
+    running = RunningRemainder(
+        remainder, reverses_rad=3e-4 * float(np.ptp(at.position_rad, axis=0)[0])
+    )
     every = [
-        running(*(x[i] for x in (at.time_s, at.position_rad, at.velocity_rad_s, at.acceleration_rad_s2, at.load_nm)))
+        running(
+            *(
+                x[i]
+                for x in (
+                    at.time_s,
+                    at.position_rad,
+                    at.velocity_rad_s,
+                    at.acceleration_rad_s2,
+                    at.load_nm,
+                )
+            )
+        )
         for i in range(len(at.time_s))
     ]
     whole = remainder.torque(at)

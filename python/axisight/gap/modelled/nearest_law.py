@@ -40,7 +40,8 @@ def with_nearest_laws(fitted: Remainder, view: InverseView, model: FittedModel) 
     """
     courses = _Courses.of(view)
     laws = {
-        axis: list(_laws(axis, view, model, courses)) for axis in sorted({t.axis for t in fitted.terms})
+        axis: list(_laws(axis, view, model, courses))
+        for axis in sorted({t.axis for t in fitted.terms})
     }
     terms = tuple(replace(t, hint=_hint(t, courses, laws[t.axis])) for t in fitted.terms)
     return replace(fitted, terms=terms)
@@ -82,9 +83,7 @@ class _Law:
     columns: Array
 
 
-def _laws(
-    axis: int, view: InverseView, model: FittedModel, courses: _Courses
-) -> Iterator[_Law]:
+def _laws(axis: int, view: InverseView, model: FittedModel, courses: _Courses) -> Iterator[_Law]:
     for candidate in view.candidates(model, axes=[axis]):
         effect, info = candidate.effect, effect_info(candidate.effect.name)
         if effect.axis != axis:

@@ -100,7 +100,10 @@ def judged(
 
     def gaps(of: Sequence[Record], torques: Sequence[Array]) -> tuple[Stage, Stage]:
         left = [_error(r, t) for r, t in zip(of, torques, strict=True)]
-        moving = [e * m / np.sqrt(np.maximum(m.mean(axis=0), 1e-9)) for e, m in zip(left, moves, strict=True)]
+        moving = [
+            e * m / np.sqrt(np.maximum(m.mean(axis=0), 1e-9))
+            for e, m in zip(left, moves, strict=True)
+        ]
         whole, part = (
             stage(held, errors, view.settings.block_s, measured, view.silent)
             for errors in (left, moving)
