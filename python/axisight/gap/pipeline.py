@@ -85,6 +85,8 @@ def diagnose(
         each estimation log, then one for each validation log. ``Diagnosis.simulator`` says how far the
         model reproduces it. The gap is then that of your simulator, by inverse dynamics if motions
         are alike.
+    remainder : also model what the causes leave, ``Diagnosis.remainder.modelled``. The verdict stays; the
+        headline adds the gap with the modelled remainder.
 
     Returns
     -------

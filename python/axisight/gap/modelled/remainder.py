@@ -56,7 +56,7 @@ def with_modelled_remainder(
     modelled = judged(fitted, seen, held, after, base)
     return replace(
         out,
-        headline=f"{out.headline} {_told(modelled)}",
+        headline=f"{out.headline} {_told(modelled, by_inverse=seen is not view)}",
         remainder=replace(out.remainder, modelled=modelled),
         checks=checks,
     )
@@ -139,10 +139,11 @@ def _per_axis(of: Stage) -> Array:
     return np.asarray(np.sqrt(np.mean(of.per_log(), axis=0)))
 
 
-def _told(modelled: ModelledRemainder) -> str:
+def _told(modelled: ModelledRemainder, *, by_inverse: bool) -> str:
     if not modelled.model.terms:
         return "The remainder follows no variable that a model could carry to other motions."
+    how = ", by inverse dynamics" if by_inverse else ""
     return (
         f"Remainder modelled: from {percent(modelled.gap_before)} to {percent(modelled.gap_after)} on the "
-        f"validation logs."
+        f"validation logs{how}."
     )
