@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import Effect, effect_info
+from axisight.effects import Effect, effect_info, effect_table
 from axisight.gap.facts.simulator_variant import Variant
 from axisight.gap.signals.motion import Motion, motion
 from axisight.gap.simulator.own_parameters import with_values
@@ -23,8 +23,6 @@ Array = NDArray[np.float64]
 
 # Step of the derivative by a parameter of a cause, as a share of its value.
 _STEP = 1e-3
-# Own parameters of a drive whose torque does not go through the gear.
-_ON_THE_MOTOR = ("viscous_friction", "motor_inertia")
 
 
 def records_of(
@@ -82,7 +80,12 @@ def _lowpass(view: InverseView, log: Log) -> Callable[[Array], Array]:
 def _without_drives(robot: Robot, after: Variant) -> tuple[Robot, Variant]:
     """Return the simulator whose torque is the load of the gears: bodies alone, with causes that change bodies."""
     changed = with_values(robot, after.robot_values)
-    own = {name: 0.0 for name in changed.parameters() if name.endswith(_ON_THE_MOTOR)}
+    on_motors = {
+        info.stands_for[0]
+        for info in effect_table().values()
+        if info.stands_for and info.acts == "motor"
+    }
+    own = {n: 0.0 for n in changed.parameters() if n.rsplit(".", 1)[1] in on_motors}
     bodies = [e for e in changed.effects if _moves_bodies(e)]
     bare = changed.with_parameters(own).with_effects(bodies)
     return bare, Variant({}, tuple(e for e in after.effects if _moves_bodies(e)))
