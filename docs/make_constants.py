@@ -41,6 +41,7 @@ ROOMS: Mapping[str, str] = {
     "hypotheses": "Where fits begin",
     "intake": "What a user hands over",
     "measure": "The gap and detection limits",
+    "modelled": "The remainder as a model",
     "prepare": "Logs made ready",
     "ranking": "Probabilities",
     "screening": "One round of the search",

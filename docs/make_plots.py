@@ -23,6 +23,7 @@ from axisight.blind.plots import plot_calibration, plot_confusion
 from axisight.cli.demo import write_demo_case
 from axisight.excitation.plots import plot_optimal_spectrum, plot_references, plot_signal
 from axisight.posterior import plot_corner
+from axisight.remainder import Motion, Record, Remainder, fit_remainder
 from axisight.responses import plot_levels
 
 PAGE = Path(__file__).resolve().parent / "plots.md"
@@ -72,6 +73,10 @@ SHOWN = {
     "axisight.plot_overlay": (
         "found, axis=2",
         "Measured torque, and the torque of the simulator before and after, on a validation log.",
+    ),
+    "axisight.plot_remainder": (
+        "remainder",
+        "Terms of a [modelled remainder](remainder.md) with their 95 % bands.",
     ),
     "axisight.plot_response_matrix": ("response", "A measured frequency response, all elements."),
     "axisight.plot_bode": (
@@ -140,6 +145,7 @@ def figures() -> dict[str, Callable[[], Figure]]:
         "plot_parameters": lambda: axisight.plot_parameters(found),
         "plot_corner": lambda: plot_corner(found.posterior, number=800),
         "plot_overlay": lambda: axisight.plot_overlay(found, axis=2),
+        "plot_remainder": lambda: axisight.plot_remainder(coupled_friction()),
         "plot_response_matrix": lambda: axisight.plot_response_matrix(all_),
         "plot_bode": lambda: axisight.plot_bode(
             {"all periods": all_, "two periods": two}, output=1, input=2
@@ -151,6 +157,27 @@ def figures() -> dict[str, Callable[[], Figure]]:
         "plot_confusion": lambda: plot_confusion(score),
         "plot_calibration": lambda: plot_calibration(score),
     }
+
+
+def coupled_friction() -> Remainder:
+    """Return the remainder of an axis whose friction grows with the speed of another axis and with a cosine."""
+    t = np.arange(0.0, 20.0, 0.01)
+    runs = []
+    for run in range(3):
+        angle = np.sin(np.outer(t, [2.0, 3.1]) + run) + 0.5 * np.sin(np.outer(t, [3.3, 1.3]))
+        speed = np.gradient(angle, t, axis=0)
+        motion = Motion(
+            name=f"run {run}",
+            time_s=t,
+            position_rad=angle,
+            velocity_rad_s=speed,
+            acceleration_rad_s2=np.gradient(speed, t, axis=0),
+            load_nm=np.cos(angle),
+        )
+        noise = np.random.default_rng(run).normal(0.0, 0.3, angle.shape)
+        lacking = np.sign(speed[:, :1]) * np.abs(speed[:, 1:]) + np.cos(2 * angle[:, :1])
+        runs.append(Record(motion=motion, residual_nm=noise + lacking * [1, 0]))
+    return fit_remainder(runs)
 
 
 def with_distortion() -> xr.Dataset:

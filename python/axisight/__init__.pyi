@@ -13,6 +13,7 @@ from . import (
     paths,
     posterior,
     records,
+    remainder,
     repeats,
     responses,
     rigid_body,
@@ -73,6 +74,9 @@ from .logs import (
     check_log,
     read_case,
     read_log,
+)
+from .remainder.plots import (
+    plot_remainder,
 )
 from .report.forest import (
     plot_parameters,
@@ -143,6 +147,7 @@ __all__ = [
     "plot_overlay",
     "plot_parameters",
     "plot_ranking",
+    "plot_remainder",
     "plot_response_matrix",
     "plot_simulation",
     "posterior",
@@ -150,6 +155,7 @@ __all__ = [
     "read_case",
     "read_log",
     "records",
+    "remainder",
     "repeats",
     "resolver_ripple",
     "responses",

@@ -139,6 +139,22 @@ def diagnose_command(
             "'axisight randomize'.",
         ),
     ] = None,
+    with_remainder: Annotated[
+        bool,
+        typer.Option(
+            "--with-remainder",
+            help="Also model what the causes leave: smooth functions of speed, load and other variables, judged on "
+            "the validation logs.",
+        ),
+    ] = False,
+    remainder_table: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="TOML",
+            rich_help_panel=OUTPUT,
+            help="Write the modelled remainder here as a table, for a simulator. Needs --with-remainder.",
+        ),
+    ] = None,
     exit_code: Annotated[
         bool,
         typer.Option(
@@ -293,6 +309,8 @@ def diagnose_command(
             "--posterior": posterior,
             "--simulated": simulated,
             "--explain": explain,
+            "--with-remainder": with_remainder,
+            "--remainder-table": remainder_table,
             "--verbose": verbose,
             "--force": force,
             "--exit-code": exit_code,
@@ -341,12 +359,15 @@ def diagnose_command(
             max_bytes=max_bytes,
         )
         asked = None if experiment_on is None else experiment_on(inputs.robot)
+        if remainder_table is not None and not with_remainder:
+            raise InputError("--remainder-table: expected --with-remainder beside it, got none")
         outputs = Outputs(
             json,
             report,
             write_model,
             signals,
             posterior,
+            remainder_table,
             next_experiment,
             to_show is not None,
             force,
@@ -376,6 +397,7 @@ def diagnose_command(
                 signals=signals is not None,
                 posterior=posterior is not None,
                 simulated=inputs.simulated,
+                remainder=with_remainder,
             )
         show_diagnosis(found, verbose=verbose, given=outputs.given())
         if explain:

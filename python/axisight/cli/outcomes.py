@@ -15,6 +15,7 @@ from axisight.gap import Diagnosis
 from axisight.gap.facts.wording import listed
 from axisight.gap.intake.inputs import Inputs
 from axisight.gap.verdict.headline import clear_changes
+from axisight.remainder import save_remainder
 from axisight.write_back import Written
 from axisight.write_back.refitted import refitted_gains
 
@@ -28,6 +29,14 @@ def write_found_signals(found: Diagnosis, target: Path) -> None:
     say(f"signals: {axisight.signal_files.write_signals(found.signals, target, overwrite=True)}")
 
 
+def write_found_remainder(found: Diagnosis, target: Path) -> None:
+    """Write the modelled remainder as a table, if there is one, and print the path."""
+    left = found.remainder
+    if left is None or left.modelled is None or not left.modelled.model.terms:
+        say("no table was written: the remainder has no term")
+        return
+    save_remainder(left.modelled.model, target, overwrite=True)
+    say(f"remainder: {target}")
 def write_found_posterior(found: Diagnosis, target: Path) -> None:
     """Write the posterior of a diagnosis; print the path and how much held-out torque its band holds."""
     assert found.posterior is not None

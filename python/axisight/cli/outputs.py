@@ -14,6 +14,7 @@ from axisight.cli.outcomes import (
     write_found_experiment,
     write_found_model,
     write_found_posterior,
+    write_found_remainder,
     write_found_signals,
 )
 from axisight.cli.screen import is_output
@@ -29,6 +30,7 @@ _RESULTS = {
     "--report": (".html", ".htm"),
     "--signals": (".parquet", ".mcap"),
     "--posterior": (".nc",),
+    "--remainder-table": (".toml",),
     "--write-model": (),
 }
 
@@ -45,6 +47,7 @@ class Outputs:
     model: Path | None
     signals: Path | None
     posterior: Path | None
+    remainder: Path | None
     next_experiment: Path | None
     to_show: bool
     force: bool
@@ -57,6 +60,7 @@ class Outputs:
             "--write-model": self.model,
             "--signals": self.signals,
             "--posterior": self.posterior,
+            "--remainder-table": self.remainder,
             "--next-experiment": self.next_experiment,
         }
         return [option for option, path in files.items() if path is not None]
@@ -73,6 +77,7 @@ class Outputs:
             "--write-model": self.model,
             "--signals": self.signals,
             "--posterior": self.posterior,
+            "--remainder-table": self.remainder,
         }
         if self.next_experiment is not None:
             for path in experiment_files(self.next_experiment):
@@ -100,4 +105,6 @@ class Outputs:
             out.append(partial(write_found_signals, found, self.signals))
         if self.posterior is not None:
             out.append(partial(write_found_posterior, found, self.posterior))
+        if self.remainder is not None:
+            out.append(partial(write_found_remainder, found, self.remainder))
         return out

@@ -114,6 +114,9 @@ def _show_places(found: Diagnosis) -> None:
     say(f"remains above noise: {_percent(left.gap)} of the {torque_of(found.gap.compared)}{varies}")
     for place in left.where:
         say(f"remains: {_place(place)}")
+    if left.modelled is not None:
+        for line in left.modelled.lines():
+            say(f"remainder: {line}")
 
 
 def _place(where: Where) -> str:

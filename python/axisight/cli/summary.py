@@ -204,6 +204,20 @@ def _places(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
     return out
 
 
+def _modelled(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
+    """Return the terms of the modelled remainder, those with the largest gain first."""
+    left = found.remainder
+    if left is None or left.modelled is None:
+        return []
+    terms = sorted(left.modelled.model.terms, key=lambda t: -t.gain)
+    shown = terms[: 2 + detail.places]
+    lines = [
+        _cut(f"remainder on axis {t.axis}: {t.words} ({100 * t.gain:.0f} %)", width) for t in shown
+    ]
+    more = len(terms) - len(shown)
+    return [*lines, *([f"and {more} more terms: --verbose"] if more else [])]
+
+
 def _findings(found: Diagnosis, width: int, detail: _Detail) -> list[str]:
     findings = sorted(found.findings, key=_is_minor)
     count = "1 finding" if len(findings) == 1 else f"{len(findings)} findings"
@@ -237,6 +251,7 @@ _SECTIONS: tuple[Callable[[Diagnosis, int, _Detail], list[str]], ...] = (
     _causes,
     _gaps,
     _places,
+    _modelled,
     _findings,
 )
 

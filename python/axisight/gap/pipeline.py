@@ -56,6 +56,7 @@ def diagnose(
     signals: bool = False,
     posterior: bool = False,
     simulated: LogsLike = (),
+    remainder: bool = False,
 ) -> Diagnosis:
     """Say where a simulator disagrees with measured logs, which effect causes it, and how far it shrinks.
 
@@ -87,6 +88,8 @@ def diagnose(
         each estimation log, then one for each validation log. ``Diagnosis.simulator`` says how far the
         model reproduces it. The gap is then that of your simulator, by inverse dynamics if motions
         are alike.
+    remainder : also model what the causes leave, ``Diagnosis.remainder.modelled``. The verdict stays; the
+        headline adds the gap with the modelled remainder.
 
     Returns
     -------
@@ -105,7 +108,7 @@ def diagnose(
     check_options(settings)
     given = given_inputs(case, logs, robot, estimation, validation, simulated, columns)
     asked = Asking(separate, to_show, within)
-    wanted = Wanted(signals, posterior)
+    wanted = Wanted(signals, posterior, remainder)
     found = _diagnosed(given, name or given.name, settings or Settings(), progress, asked, wanted)
     return replace(found, checks=(*given.says, *found.checks))
 
@@ -174,7 +177,7 @@ def _diagnosed(
         keep = bool(unknown) and out.verdict == "undecidable"
         out = asked.added(out, view, seen.found, keep=keep)
         progress("designing an experiment", 1, 1)
-    out = wanted.added(out, view, held_logs, seen, progress, logged=commanded is None)
+    out = wanted.added(out, view, held_logs, seen, chosen, progress, logged=commanded is None)
     checks = (*out.checks, *inputs.says(view.mode, view.compared))
     found_faults = (*inputs.constants(out.refit), *out.findings)
     out = replace(out, simulator=inputs.simulator, checks=checks, findings=found_faults)

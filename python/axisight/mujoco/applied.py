@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from axisight.effects import Effect
-from axisight.errors import InputError, MissingExtraError
+from axisight.errors import InputError
+from axisight.mujoco.dynamics import gear_load, library, moves_of
 from axisight.mujoco.end_of_step import torque_at_end
 from axisight.mujoco.gears import Gear
 from axisight.mujoco.joints import Axes, axes_of, springs_of
@@ -66,7 +66,7 @@ def apply(
     Raises MissingExtraError without MuJoCo, ConvergenceError if the time step is too long.
 
     """
-    mujoco = _mujoco()
+    mujoco = library()
     axes = axes_of(mujoco, model, data, joints, gears or {})
     ratio = np.asarray(gear_ratio, np.float64)
     if ratio.shape not in ((), axes.dofs.shape):
@@ -82,7 +82,7 @@ def apply(
     if not acting:
         return np.zeros(len(axes.dofs))
     in_gears = _in_gears(mujoco, model, data, axes, inside, data.qvel)
-    load = _load(mujoco, model, data)[axes.dofs]
+    load = gear_load(mujoco, model, data)[axes.dofs]
     mujoco.mj_fwdActuation(model, data)
     command = data.qfrc_actuator[axes.dofs] * ratio
     known = torques.of_command(command) + in_gears
@@ -91,7 +91,7 @@ def apply(
     step = model.opt.timestep
     free = data.qvel + step * data.qacc_smooth
     angle = data.qpos[axes.places]
-    moves = step * _moves(mujoco, model, data, axes.dofs)
+    moves = step * moves_of(mujoco, model, data, axes.dofs)
     found = torque_at_end(
         lambda speeds: torques(angle, speeds, load, command),
         free[axes.dofs],
@@ -170,29 +170,3 @@ def _kept(mujoco: Any, model: Any, data: Any, gears: Sequence[Gear]) -> Array:
             "got RK4"
         )
     return np.asarray(data.userdata[model.nuserdata - need :])
-
-
-def _load(mujoco: Any, model: Any, data: Any) -> Array:
-    """Return the torque that the arm requires of its gears (nv,) [Nm], without springs and rotors."""
-    inertia = np.zeros(model.nv)
-    mujoco.mj_mulM(model, data, inertia, data.qacc)
-    rotors = model.dof_armature * data.qacc
-    return np.asarray(inertia - rotors + data.qfrc_bias - data.qfrc_spring)
-
-
-def _moves(mujoco: Any, model: Any, data: Any, dofs: NDArray[np.int64]) -> Array:
-    """Return the accelerations by torques on joints (n_axes, nv) [rad/s^2/Nm]."""
-    pushes = np.zeros((len(dofs), model.nv))
-    pushes[np.arange(len(dofs)), dofs] = 1.0
-    moves = np.zeros_like(pushes)
-    mujoco.mj_solveM(model, data, moves, pushes)
-    return moves
-
-
-def _mujoco() -> Any:
-    try:
-        return import_module("mujoco")
-    except ImportError as error:
-        raise MissingExtraError(
-            "axisight.mujoco needs MuJoCo: pip install 'axisight[mujoco]'"
-        ) from error

@@ -28,6 +28,7 @@ from axisight.report.account import account
 from axisight.report.colors import shade
 from axisight.report.figures import TOP, overlays_by_log, ranking_bars
 from axisight.report.limits import limit_table
+from axisight.report.remainder_figures import modelled_remainder
 from axisight.report.template import rendered
 from axisight.report.wording import (
     NO_VALUE,
@@ -222,7 +223,11 @@ def _remainder(remainder: Remainder, torque: str) -> dict[str, Any]:
             f"With the causes in, {percent(remainder.gap)} of the {torque} on the validation logs remain above the "
             f"floor.{'' if varies is None else f' The remainder varies with {varies}.'}"
         )
-    return {"text": text, "where": _places(remainder.where)}
+    return {
+        "text": text,
+        "where": _places(remainder.where),
+        "modelled": modelled_remainder(remainder.modelled),
+    }
 
 
 def _values(causes: Sequence[Cause]) -> dict[str, Any]:

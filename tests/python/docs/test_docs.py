@@ -31,6 +31,7 @@ MODULES = (
     axisight.paths,
     axisight.posterior,
     axisight.records,
+    axisight.remainder,
     axisight.repeats,
     axisight.responses,
     axisight.rigid_body,

@@ -234,7 +234,7 @@ def test_misuse_is_named(arm: Robot, monkeypatch: pytest.MonkeyPatch):
     def no(name: str):
         raise ImportError(name)
 
-    monkeypatch.setattr("axisight.mujoco.applied.import_module", no)
+    monkeypatch.setattr("axisight.mujoco.dynamics.import_module", no)
     with pytest.raises(MissingExtraError, match=r"pip install 'axisight\[mujoco\]'"):
         apply(model, data, [])
 

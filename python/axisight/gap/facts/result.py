@@ -25,6 +25,7 @@ from axisight.gap.facts.schema import VERDICT_SCHEMA
 from axisight.gap.facts.shown import cause_in_words, cause_rows, percent
 from axisight.gap.facts.trace import Trace
 from axisight.posterior.result import Posterior
+from axisight.remainder import ModelledRemainder
 from axisight.robot.axis_names import axis_number
 from axisight.storage import write_whole
 
@@ -161,13 +162,14 @@ class Remainder:
     ``gap``: sqrt(after^2 - floor^2) [1], zero where only noise is left; ``per_axis``: the same by axis, (n_axes,).
     ``where``: places above the floor, with shares of the squared remainder. ``varies_with``: the variable that it
     follows at the first place (``speed``, ``direction``, ``position``, ``acceleration``, ``load``, ``time``, or ``the
-    speed of axis`` and its number), if any.
+    speed of axis`` and its number), if any. ``modelled``: its model, if it was asked for.
     """
 
     gap: float
     per_axis: Array
     where: tuple[Where, ...] = ()
     varies_with: str | None = None
+    modelled: ModelledRemainder | None = None
 
 
 @summarized
@@ -558,7 +560,7 @@ def _remainder(remainder: Remainder) -> dict[str, Any]:
         "per_axis": remainder.per_axis.tolist(),
         "where": [_where(w) for w in remainder.where],
         "varies_with": remainder.varies_with,
-    }
+    } | ({} if remainder.modelled is None else {"modelled": remainder.modelled.to_dict()})
 
 
 def _place(item: Cause | Candidate | DetectionLimit) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Data that are asked for beside a verdict: torques of all logs, and the joint posterior of its parameters."""
+"""What is asked for beside a verdict: torques of all logs, the joint posterior of its parameters, a modelled remainder."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 
 from axisight.arguments import switch
 from axisight.gap.facts.result import Diagnosis
+from axisight.gap.facts.settings import Settings
 from axisight.gap.measure.torque_traces import signals_of
+from axisight.gap.modelled.remainder import with_modelled_remainder
 from axisight.gap.screening.search_round import Progress
 from axisight.gap.uncertainty.posterior_of import posterior_of
 from axisight.gap.verdict.validated import Validated
@@ -21,11 +23,13 @@ class Wanted:
 
     signals: bool
     posterior: bool
+    remainder: bool
 
     def __post_init__(self) -> None:
         """Raise InputError for what is neither true nor false."""
         switch("signals", self.signals)
         switch("posterior", self.posterior)
+        switch("remainder", self.remainder)
 
     def added(
         self,
@@ -33,13 +37,16 @@ class Wanted:
         view: View,
         held_logs: Sequence[Log],
         seen: Validated,
+        settings: Settings,
         progress: Progress,
         *,
         logged: bool,
     ) -> Diagnosis:
         """Return a diagnosis with the data that are asked for; ``logged``: whether torques were logged."""
+        after = seen.reach.simulator
+        if self.remainder:
+            found = with_modelled_remainder(found, view, held_logs, after, settings)
         if self.signals:
-            after = seen.reach.simulator
             found = replace(found, signals=signals_of(view, held_logs, after, logged=logged))
         if self.posterior:
             progress("computing the posterior", 0, 1)

@@ -101,6 +101,8 @@ class InverseView(View):
             "inverse_dynamics", robot, logs, settings, fitter, floor, self.filtering.cutoff_hz
         )
         self.silent = fitter.silent = tuple(silent)
+        self.certainty: Sequence[Array] = fitter.certainty
+        """Weight of each sample of the estimation logs in fits (n, n_axes)."""
         self.unfelt = other_controllers_of_targets(robot, logs)
 
     def _certain(self, logs: Sequence[Log], motions: Sequence[Motion], floor: Floor) -> list[Array]:

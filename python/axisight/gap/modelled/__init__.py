@@ -1,0 +1,1 @@
+"""Models what the causes leave of the gap, after the verdict."""
