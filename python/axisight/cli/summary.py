@@ -82,11 +82,11 @@ def next_steps(found: Diagnosis, given: Collection[str] = (), command: str = "")
     """
     out = [] if found.next_experiment is None else [found.next_experiment]
     offers = {
-        "--next-experiment": "--next-experiment FOLDER designs the motions that tell the causes apart.",
+        "--next-experiment": f"--next-experiment FOLDER designs {_motions(found)}.",
         "--write-model": f"--write-model FILE writes the simulator with {_them(found)}.",
         "--report": "--report report.html draws where the gap lies.",
     }
-    if found.verdict != "undecidable" or not _can_be_designed(found):
+    if found.verdict not in ("undecidable", "unknown", "explained_in_part"):
         del offers["--next-experiment"]
     if found.verdict == "undecidable" or not found.causes:
         del offers["--write-model"]
@@ -102,8 +102,11 @@ def next_steps(found: Diagnosis, given: Collection[str] = (), command: str = "")
     return out
 
 
-def _can_be_designed(found: Diagnosis) -> bool:
-    return found.mode == "closed_loop" and found.gap.compared == "torques"
+def _motions(found: Diagnosis) -> str:
+    """Return which motions an experiment after this verdict has."""
+    if found.verdict == "undecidable":
+        return "the motions that tell the causes apart"
+    return "a record that shows more: repeats, slow motion, a known load"
 
 
 def _them(found: Diagnosis) -> str:
