@@ -1,4 +1,4 @@
-"""Trajectory generation: paths through joint or tool positions, run as fast as the limits allow; files of trajectories."""
+"""Trajectory generation: paths through joint or tool positions, as fast as limits allow; their files."""
 
 from axisight.paths.joint_path import JointPath, joint_path
 from axisight.paths.plan import motion_references, plan

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -145,7 +144,7 @@ def _csv(trajectory: JointTrajectory) -> str:
 
 
 def _ros_message(trajectory: JointTrajectory) -> str:
-    """Return a message as YAML, each point as JSON on a line of its own."""
+    """Return a message as YAML, each point on a line of its own."""
     names = json.dumps(list(trajectory.joint_names))
     lines = [
         "header: {stamp: {sec: 0, nanosec: 0}, frame_id: ''}",
@@ -159,15 +158,15 @@ def _ros_message(trajectory: JointTrajectory) -> str:
 def _point(trajectory: JointTrajectory, k: int) -> str:
     due_ns = round(1e9 * (APPROACH_S + k * trajectory.sample_time_s))
     sec, nanosec = divmod(due_ns, 10**9)
-    point = {
-        "positions": _rounded(trajectory.position[k]),
-        "velocities": _rounded(trajectory.velocity[k]),
-        "accelerations": _rounded(trajectory.acceleration[k]),
-        "time_from_start": {"sec": sec, "nanosec": nanosec},
+    rows = {
+        "positions": trajectory.position,
+        "velocities": trajectory.velocity,
+        "accelerations": trajectory.acceleration,
     }
-    return json.dumps(point)
+    numbers_of = "".join(f"{name}: [{_fixed(values[k])}], " for name, values in rows.items())
+    return f"{{{numbers_of}time_from_start: {{sec: {sec}, nanosec: {nanosec}}}}}"
 
 
-def _rounded(values: Sequence[float] | Real) -> list[float]:
-    """Return numbers of eight decimals, with which YAML readers need no exponent."""
-    return [round(float(x), 8) + 0.0 for x in values]
+def _fixed(values: Real) -> str:
+    """Return numbers with eight decimals. YAML 1.1 takes 1e-08 for text."""
+    return ", ".join(f"{x + 0.0:.8f}" for x in values)

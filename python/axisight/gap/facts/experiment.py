@@ -186,7 +186,7 @@ class ShowingExperiment(Experiment):
 @summarized
 @dataclass(frozen=True, eq=False)
 class KnownLoad:
-    """A load for a run: ``mass_kg`` [kg], ``centre_m`` its centre of mass (x, y, z) [m] in the frame of the last link."""
+    """A load for a run: ``mass_kg`` [kg], ``centre_m`` its centre (x, y, z) [m] in the frame of the last link."""
 
     mass_kg: float
     centre_m: tuple[float, float, float]

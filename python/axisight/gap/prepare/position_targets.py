@@ -88,7 +88,7 @@ class Commanded:
         return replace(self, logs=tuple(told))
 
     def along_targets(self, log: Log) -> Log:
-        """Return a log of targets at the logged rate, which begins at rest, as `logs` are: with references and start."""
+        """Return a log of targets at the logged rate, from rest, with references at the controller's rate and start."""
         told = _commanded(self.robot, log, self.step)
         return replace(told, start_rad=start_of(self.robot, log.position_rad[0]))
 

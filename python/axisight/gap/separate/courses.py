@@ -19,9 +19,11 @@ Array = NDArray[np.float64]
 # Length of an experiment [s]: that of the longest log within these limits.
 _SECONDS = (8.0, 20.0)
 # Sizes and speeds at which a motion is tried, as shares of the largest.
-_LEVELS = (1.0, 0.6, 0.3, 0.1)
+_LEVELS = (1.0, 0.4, 0.1)
 # Slow speeds of triangles, as shares of the largest.
 _SLOW = (0.2, 0.05)
+# Longest time that triangles take for the whole travel [s], and the time for rounded corners relative to sharp ones.
+_LONGEST_S, _ROUNDING = 60.0, 1.1
 # Highest frequency of a sum of sines, as shares of the highest that is compared.
 _BANDS = (1.0, 0.4, 0.15)
 # Smallest number of sines in a sum, and the largest.
@@ -93,7 +95,9 @@ def courses(room: Room, axes: Sequence[int], seed: int) -> Iterator[Motion]:
             yield from _sums(room, which, band, seed)
         for level in _LEVELS:
             for words, speed in _turning(room).items():
-                yield _made(f"{words}{_at(level)}", which, np.tile(speed, (room.n_axes, 1)), room, level)
+                yield _made(
+                    f"{words}{_at(level)}", which, np.tile(speed, (room.n_axes, 1)), room, level
+                )
         for level in _SLOW:
             yield triangles(room, which, level)
 
@@ -102,6 +106,19 @@ def triangles(room: Room, axes: Sequence[int], level: float = _SLOW[0]) -> Motio
     """Return triangles of position at a share ``level`` of the largest speed, on ``axes`` (from 1)."""
     speed = np.tile(_triangle(room), (room.n_axes, 1))
     return _made(f"Slow triangles{_at(level)}", axes, speed, room, level)
+
+
+def whole_travel(room: Room) -> Motion:
+    """Return slow triangles of all axes, as long as the whole travel takes, at most 60 s."""
+    limits, level = room.limits, _SLOW[0]
+    speed = np.maximum(level * limits.speed, 1e-12)
+    quarter_s = float(np.max(np.minimum(limits.forth, -limits.back) / speed))
+    seconds = float(np.clip(_ROUNDING * 4 * quarter_s, _SECONDS[0], _LONGEST_S))
+    longer = replace(room, seconds=seconds)
+    course = np.tile(_triangle(longer), (room.n_axes, 1))
+    # The full size fits the travel in this time; where time is short, the speed stays at its level.
+    slow = replace(longer, limits=replace(limits, speed=speed))
+    return _made("Slow triangles", room.every, course, slow, 1.0)
 
 
 def _sums(room: Room, axes: Sequence[int], band: float, seed: int) -> Iterator[SumOfSines]:

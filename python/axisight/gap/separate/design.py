@@ -146,14 +146,17 @@ def _seen(
     out = {k: [nothing] * len(turns) for k in which}
     here = [k for k in which if all(r.possible[k] for r in runs)]
     together = [here] if here else []
-    for place, (run, turn) in enumerate(zip(runs, turns, strict=True)):
-        for group in [[k] for k in here] if alone else together:
+    for group in [[k] for k in here] if alone else together:
+        # What a machine shows without the effects in question is the same for all rivals.
+        shown: dict[tuple[int, tuple[Hypothesis, ...]], Array] = {}
+        for place, (run, turn) in enumerate(zip(runs, turns, strict=True)):
             fitter = route.fitter(run, group, alone=alone)
             left, samples = _left(fitter, turn.other, turn.free, n_axes)
-            there = left
-            if turn.neither != turn.free:
-                there, _ = _left(fitter, turn.other, turn.neither, n_axes)
-            for k, a, b, n in zip(group, left, there, samples, strict=True):
+            key = (id(turn.machine), turn.neither)
+            if key not in shown:
+                same = turn.neither == turn.free
+                shown[key] = left if same else _left(fitter, turn.other, turn.neither, n_axes)[0]
+            for k, a, b, n in zip(group, left, shown[key], samples, strict=True):
                 out[k][place] = Seen(a, b, n)
     return out
 

@@ -79,7 +79,9 @@ def _inside(robot: Robot, room: Array, motor_rad: Array) -> bool:
     return True
 
 
-def within_limits(seen: Range, limits: ExperimentLimits | None, robot: Robot, start: Array) -> Range:
+def within_limits(
+    seen: Range, limits: ExperimentLimits | None, robot: Robot, start: Array
+) -> Range:
     """Return a seen range with the stated limits in its place, cut to the joint ranges of the robot's model.
 
     ``start`` (n_axes,): positions of the motors where the experiment begins [rad]. Raises InputError for limits that

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.gap.fit.fitted_model import FittedModel
-from axisight.gap.separate.courses import Room, triangles
+from axisight.gap.separate.courses import Room, whole_travel
 from axisight.gap.separate.limits import ExperimentLimits, Range, within_limits
 from axisight.gap.separate.route import Route, Runs
 from axisight.gap.separate.waves import SECONDS, Motion, motions, seen_range, standard
@@ -54,7 +54,7 @@ class LoopRoute(Route):
         # Triangles begin in the middle of the travel: to either side is as far as the shorter side allows.
         half = np.minimum(self.limits.forth, -self.limits.back)
         room = Room(replace(self.limits, back=-half, forth=half), self.step_s, SECONDS, 1.0)
-        return triangles(room, room.every)
+        return whole_travel(room)
 
     def runs(self, machine: FittedModel, tried: Sequence[Motion]) -> Runs:
         """Return runs of a machine in its loop."""
@@ -72,8 +72,7 @@ class LoopRoute(Route):
             for q, u in zip(angle, torque, strict=True)
         ]
         possible = [
-            self.limits.allows(robot, self.start_rad, q - q[0], u)
-            and self._slow_enough(q)
+            self.limits.allows(robot, self.start_rad, q - q[0], u) and self._slow_enough(q)
             for q, u in zip(angle, torque, strict=True)
         ]
         return Runs(records, list(torque), np.array(possible, bool))

@@ -18,7 +18,7 @@ from axisight.gap.separate.courses import (
     courses,
     improved,
     length_s,
-    triangles,
+    whole_travel,
 )
 from axisight.gap.separate.limits import ExperimentLimits, Range, travel_of, within_limits
 from axisight.gap.separate.route import Route, Runs
@@ -31,8 +31,6 @@ from axisight.logs import Log, differentiate
 
 Array = NDArray[np.float64]
 
-# Variants of a motion in each round of its improvement.
-_VARIANTS = 12
 # Smallest speed and acceleration of a motor as a share of the largest of all, so that a motor at rest may move.
 _LEAST = 1e-6
 
@@ -43,9 +41,16 @@ class PositionRoute(Route):
     usual: ClassVar[str] = "The motion of the first log"
     # A log may begin and end in motion, which no controller can be told.
     offers_usual = False
+    variants: ClassVar[int]
+    """Variants of a motion in each round of its improvement."""
 
     def __init__(
-        self, view: View, step_s: float, widest_hz: float, seen: Range, within: ExperimentLimits | None
+        self,
+        view: View,
+        step_s: float,
+        widest_hz: float,
+        seen: Range,
+        within: ExperimentLimits | None,
     ) -> None:
         self.view, self.step_s = view, step_s
         start = view.logs[0].position_rad[0]
@@ -76,12 +81,12 @@ class PositionRoute(Route):
 
     def slow_motion(self) -> Motion:
         """Return slow triangles of all axes."""
-        return triangles(self.room, self.room.every)
+        return whole_travel(self.room)
 
     def improved(self, best: Motion, round_of: int) -> list[Motion]:
         """Return sums of sines like the best one, with changed sizes and phases."""
         rng = np.random.default_rng([self.view.settings.seed, 1 + round_of])
-        return improved(best, self.room, _VARIANTS, rng)
+        return improved(best, self.room, self.variants, rng)
 
     def _positions(self, motion: Motion) -> Array:
         """Return the motors along a motion (n, n_axes) [rad]."""
@@ -95,7 +100,7 @@ class PositionRoute(Route):
             name=motion.words,
             source=self.view.logs[0].source,
             sample_time_s=self.step_s,
-            time_s=self.step_s * np.arange(len(position)),
+            time_s=np.asarray(self.step_s * np.arange(len(position)), np.float64),
             position_rad=position,
             torque_nm=np.zeros_like(position),
             velocity_rad_s=motion.reference,
@@ -107,7 +112,8 @@ class PositionRoute(Route):
 class InverseRoute(PositionRoute):
     """Positions that the motors follow; their torque is predicted."""
 
-    most_rivals = 4
+    most_rivals = 3
+    variants = 6
     view: InverseView
 
     def __init__(self, view: InverseView, within: ExperimentLimits | None = None) -> None:
@@ -145,7 +151,8 @@ class InverseRoute(PositionRoute):
 class TargetRoute(PositionRoute):
     """Position targets; each machine is simulated in its loop, and positions are compared."""
 
-    most_rivals = 3
+    most_rivals = 2
+    variants = 4
     view: TargetsView
 
     def __init__(self, view: TargetsView, within: ExperimentLimits | None = None) -> None:
@@ -185,7 +192,10 @@ class TargetRoute(PositionRoute):
 
 
 def _seen_range(
-    logs: Sequence[Log], speeds: Sequence[Array], accelerations: Sequence[Array], torques: Sequence[Array]
+    logs: Sequence[Log],
+    speeds: Sequence[Array],
+    accelerations: Sequence[Array],
+    torques: Sequence[Array],
 ) -> Range:
     """Return the range of the motors in logs, from the start of the first one."""
     speed, acceleration, torque = (

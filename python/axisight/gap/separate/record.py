@@ -87,16 +87,20 @@ def _smallest(tried: Sequence[Motion]) -> Motion:
 def _with_load(route: Route, model: FittedModel, rich: Motion) -> tuple[KnownLoad | None, Motion]:
     """Return a load that shows along the rich motion within the limits, and the motion to run with it.
 
+    Its centre is that of the last link: a load on a joint's axis would not turn the joint.
     The largest of several masses that the motors can carry along the motion, or along a smaller one.
     """
     robot = route.view.robot
-    whole = sum(joint.mass_kg for joint in robot.joints)
+    links = [j.link for j in robot.joints if j.link is not None]
+    whole = sum(link.mass_kg for link in links)
+    x, y, z = (float(c) for c in links[-1].com_m)
     for motion in _levels(rich):
         bare = route.runs(model, [motion])
         size = np.abs(bare.torques[0]).max(axis=0)
         for share in _MASSES:
-            load = KnownLoad(float(f"{share * whole:.1g}"), (0.0, 0.0, 0.0))
-            effect = Effect("payload", None, {"mass_kg": load.mass_kg})
+            load = KnownLoad(float(f"{share * whole:.1g}"), (x, y, z))
+            place = {"x_m": x, "y_m": y, "z_m": z}
+            effect = Effect("payload", None, {"mass_kg": load.mass_kg, **place})
             others = [e for e in model.effects if e.label != effect.label]
             carrying = replace(model, effects=(*others, effect))
             runs = route.runs(carrying, [motion])

@@ -140,7 +140,7 @@ class TargetsView(View):
             name="added",
             source=self.logs[0].source,
             sample_time_s=time,
-            time_s=time * np.arange(len(torque_nm)),
+            time_s=np.asarray(time * np.arange(len(torque_nm)), np.float64),
             torque_nm=torque_nm,
             position_rad=np.zeros_like(torque_nm),
         )
@@ -151,7 +151,7 @@ class TargetsView(View):
         return self._commanded.along_targets(log)
 
     def simulated(self, variant: Variant, logs: Sequence[Log]) -> tuple[list[Array], list[Array]]:
-        """Return commands [Nm] and positions [rad] of a simulator on logs, (n, n_axes) each, at the controller's rate."""
+        """Return commands [Nm] and positions [rad] of a simulator on logs (n, n_axes), at the controller's rate."""
         return simulated_runs(self.robot, variant, logs, threads=self.settings.threads)
 
     def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
