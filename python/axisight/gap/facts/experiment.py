@@ -226,7 +226,8 @@ class RecordExperiment(Experiment):
             x, y, z = self.load.centre_m
             parts.append(
                 f"Loaded ({_begun_small(self.loaded)}): fix a load that you have weighed, near {self.load.mass_kg:.2g} "
-                f"kg with its centre at ({x:.3g}, {y:.3g}, {z:.3g}) m of the last link, and state it with these logs."
+                f"kg with its centre at ({x:.3g}, {y:.3g}, {z:.3g}) m of the last link. Diagnose this log by itself, "
+                f"with --payload."
             )
         return " ".join(parts)
 
