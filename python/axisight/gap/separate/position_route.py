@@ -122,6 +122,8 @@ class InverseRoute(PositionRoute):
         seen = _seen_range(
             logs, [m[1] for m in moved], [m[2] for m in moved], [m[3] for m in moved]
         )
+        # A torque that carries nothing says nothing about what the motor may do.
+        seen.torque[list(view.silent)] = np.inf
         super().__init__(view, step_s, view.filtering.cutoff_hz, seen, within)
 
     def _course_of(self, log: Log) -> Array:
