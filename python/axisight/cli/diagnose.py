@@ -190,16 +190,17 @@ def diagnose_command(
         typer.Option(
             metavar="FOLDER",
             rich_help_panel=EXPERIMENT,
-            help="Design the motion that tells open causes apart, and write its references here. Needs "
-            "closed-loop logs with velocity references.",
+            help="Design the next experiment, and write its motion here: references, joint positions (CSV), "
+            "ROS JointTrajectory. It tells open causes apart, or shows more of what stays unknown.",
         ),
     ] = None,
     to_show: Annotated[
         str | None,
         typer.Option(
-            metavar="EFFECT",
+            metavar="EFFECT|limits",
             rich_help_panel=EXPERIMENT,
-            help="The motion shall show this effect, of this size, if the machine has it.",
+            help="The motion shall show this effect, of this size, if the machine has it. With 'limits': a record "
+            "that lowers all detection limits.",
         ),
     ] = None,
     velocity_limit: Annotated[
@@ -224,6 +225,24 @@ def diagnose_command(
             metavar="VALUE,...",
             rich_help_panel=EXPERIMENT,
             help="Torque limit of each motor, or of all (Nm). Default: what the logs reach.",
+        ),
+    ] = None,
+    acceleration_limit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VALUE,...",
+            rich_help_panel=EXPERIMENT,
+            help="Acceleration limit of each motor, or of all (rad/s^2). Default: what the logs reach; none "
+            "under velocity references.",
+        ),
+    ] = None,
+    room: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z,X,Y,Z",
+            rich_help_panel=EXPERIMENT,
+            help="Box in which the origin of the last link stays, in the base frame (m): lowest x, y, z, "
+            "highest x, y, z.",
         ),
     ] = None,
     fleet: Annotated[
@@ -304,6 +323,8 @@ def diagnose_command(
             "--velocity-limit": velocity_limit,
             "--travel-limit": travel_limit,
             "--torque-limit": torque_limit,
+            "--acceleration-limit": acceleration_limit,
+            "--room": room,
             "--write-model": write_model,
             "--signals": signals,
             "--posterior": posterior,
@@ -342,7 +363,13 @@ def diagnose_command(
                 "one diagnosis go to --report and --json"
             )
         experiment_on = asked_experiment(
-            next_experiment, to_show, velocity_limit, travel_limit, torque_limit
+            next_experiment,
+            to_show,
+            velocity_limit,
+            travel_limit,
+            torque_limit,
+            acceleration_limit,
+            room,
         )
         options = ModelOptions(base, tip, payload)
         load = partial(load_simulator, given=parse_effects(effect), options=options)

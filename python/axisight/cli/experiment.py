@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from axisight.cli.common import one_or_each
+from axisight.cli.common import numbers, one_or_each
 from axisight.cli.robot import parse_effect
 from axisight.errors import InputError
 from axisight.gap import ExperimentLimits
-from axisight.gap.separate.asked import Asked
+from axisight.gap.separate.asked import LIMITS, Asked
 from axisight.robot import Robot
 
 
@@ -19,6 +19,8 @@ def asked_experiment(
     velocity_limit: str | None,
     travel_limit: str | None,
     torque_limit: str | None,
+    acceleration_limit: str | None,
+    room: str | None,
 ) -> Callable[[Robot], Asked] | None:
     """Return a function from a robot to the requested experiment; None without ``--next-experiment``.
 
@@ -30,6 +32,8 @@ def asked_experiment(
         "--velocity-limit": velocity_limit,
         "--travel-limit": travel_limit,
         "--torque-limit": torque_limit,
+        "--acceleration-limit": acceleration_limit,
+        "--room": room,
     }
     if folder is None:
         for option, given in options.items():
@@ -40,6 +44,10 @@ def asked_experiment(
         velocity_rad_s=one_or_each("--velocity-limit", velocity_limit),
         travel_rad=one_or_each("--travel-limit", travel_limit),
         torque_nm=one_or_each("--torque-limit", torque_limit),
+        acceleration_rad_s2=one_or_each("--acceleration-limit", acceleration_limit),
+        room_m=None if room is None else numbers("--room", room),
     )
-    effect = None if to_show is None else parse_effect(to_show, "--to-show")
-    return lambda robot: Asked(None if effect is None else effect.on(robot), limits)
+    if to_show is None or to_show == LIMITS:
+        return lambda _robot: Asked(to_show, limits)
+    effect = parse_effect(to_show, "--to-show")
+    return lambda robot: Asked(effect.on(robot), limits)

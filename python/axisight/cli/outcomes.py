@@ -19,8 +19,6 @@ from axisight.remainder import save_remainder
 from axisight.write_back import Written
 from axisight.write_back.refitted import refitted_gains
 
-_DESIGNED = "experiments are designed for logs in closed loop with velocity references"
-
 _TO_SHOW = "--to-show designs one that shows what these logs would not"
 
 
@@ -108,17 +106,11 @@ def write_found_experiment(found: Diagnosis, folder: Path, *, to_show: bool) -> 
 
 def _why_none(found: Diagnosis) -> str:
     """Return why no experiment was designed."""
-    possible = found.mode == "closed_loop" and found.gap.compared != "positions"
-    hint = f" ({_TO_SHOW})" if possible else ""
     if not found.causes:
-        return f"no cause was named, so none has a rival{hint}"
-    if found.mode != "closed_loop":
-        return f"{_DESIGNED}; by inverse dynamics there is no loop to run"
-    if found.gap.compared == "positions":
-        return f"{_DESIGNED}; not for targets and positions alone"
+        return f"no cause was named, so none has a rival ({_TO_SHOW})"
     if found.equivalent:
         return f"no motion tells {listed(found.equivalent[0])} apart"
-    return f"nothing is open{hint}"
+    return f"nothing is open ({_TO_SHOW})"
 
 
 def diagnosis_writes(

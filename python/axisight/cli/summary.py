@@ -89,11 +89,11 @@ def next_steps(found: Diagnosis, given: Collection[str] = (), command: str = "")
     """
     out = [] if found.next_experiment is None else [found.next_experiment]
     offers = {
-        "--next-experiment": "--next-experiment FOLDER designs the motions that tell the causes apart.",
+        "--next-experiment": f"--next-experiment FOLDER designs {motions(found)}.",
         "--write-model": f"--write-model FILE writes the simulator with {_them(found)}.",
         "--report": "--report report.html draws where the gap lies.",
     }
-    if found.verdict != "undecidable" or not can_be_designed(found):
+    if not can_be_designed(found):
         del offers["--next-experiment"]
     if found.verdict == "undecidable" or not found.causes:
         del offers["--write-model"]
@@ -110,8 +110,15 @@ def next_steps(found: Diagnosis, given: Collection[str] = (), command: str = "")
 
 
 def can_be_designed(found: Diagnosis) -> bool:
-    """Whether an experiment can be designed: of torques that were compared in closed loop."""
-    return found.mode == "closed_loop" and found.gap.compared == "torques"
+    """Whether an experiment after this verdict would tell more."""
+    return found.verdict in ("undecidable", "unknown", "explained_in_part")
+
+
+def motions(found: Diagnosis) -> str:
+    """Return which motions an experiment after this verdict has."""
+    if found.verdict == "undecidable":
+        return "the motions that tell the causes apart"
+    return "a record that shows more: repeats, slow motion, a known load"
 
 
 def _them(found: Diagnosis) -> str:

@@ -18,7 +18,7 @@ from axisight.gap.facts.schema import verdict_schema
 from axisight.gap.facts.settings import DEFAULT_TOLERANCES, Settings
 from axisight.gap.gate import check_fit_inputs, check_inputs
 from axisight.gap.pipeline import diagnose
-from axisight.gap.separate.waves import ExperimentLimits
+from axisight.gap.separate.limits import ExperimentLimits
 
 __all__ = [
     "DEFAULT_TOLERANCES",

@@ -21,7 +21,7 @@ from axisight.gap.search.reported_torque import with_constants_told
 from axisight.gap.search.search import refitted, search
 from axisight.gap.search.stated_effects import with_scatter_taken
 from axisight.gap.separate.asked import asked_of
-from axisight.gap.separate.waves import ExperimentLimits
+from axisight.gap.separate.limits import ExperimentLimits
 from axisight.gap.simulator.tolerances import loaded
 from axisight.gap.uncertainty.beside_verdict import Wanted
 from axisight.gap.verdict.assembled import assembled
@@ -51,7 +51,7 @@ def diagnose(
     settings: Settings | None = None,
     progress: Progress = _silent,
     separate: bool = False,
-    to_show: Effect | None = None,
+    to_show: Effect | str | None = None,
     within: ExperimentLimits | None = None,
     signals: bool = False,
     posterior: bool = False,
@@ -77,10 +77,12 @@ def diagnose(
     name : what to call the case.
     settings : tolerances of the simulator's parameters, thresholds, seed.
     progress : called with (what, done, total).
-    separate : also design the experiment that tells open causes apart, ``Diagnosis.experiment``
-        (closed loop only).
-    to_show : design the experiment that shows this effect, of this size, if the machine has it.
-    within : limits of speed, travel and torque for either experiment; by default what the logs show.
+    separate : also design the next experiment, ``Diagnosis.experiment``: the motion that tells open causes
+        apart, or a record of several motions if the verdict is unknown or explained in part.
+    to_show : design the experiment that shows this effect, of this size, if the machine has it; or
+        ``"limits"``, a record that lowers all detection limits.
+    within : limits of speed, acceleration, travel, room and torque for an experiment; by default what the
+        logs show.
     signals : keep measured and simulated torques of all logs, ``Diagnosis.signals``.
     posterior : also keep the joint distribution of all parameters, ``Diagnosis.posterior``, and simulate
         50 samples of it along the validation logs. The verdict stays as it is.
@@ -118,7 +120,7 @@ class Asking:
     """What is asked for beside the diagnosis; as in `diagnose`."""
 
     separate: bool
-    to_show: Effect | None
+    to_show: Effect | str | None
     within: ExperimentLimits | None
 
 

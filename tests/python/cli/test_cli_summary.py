@@ -142,7 +142,10 @@ def test_another_command_stands_before_its_options():
 def test_an_experiment_is_offered_where_one_can_be_designed():
     found = of("undecidable")
     assert "--next-experiment" in " ".join(next_steps(found))
-    assert "--next-experiment" not in " ".join(next_steps(replace(found, mode="inverse_dynamics")))
+    inverse = replace(found, mode="inverse_dynamics")
+    assert "the motions that tell the causes apart" in " ".join(next_steps(inverse))
+    assert "a record that shows more" in " ".join(next_steps(of("unknown")))
+    assert "--next-experiment" not in " ".join(next_steps(explained()))
 
 
 def test_of_many_axes_those_with_the_largest_gaps_are_told():

@@ -138,10 +138,12 @@ class DiagnosisTools:
             self.folder.write("write_verdict", write_verdict),
             self.folder.write("write_report", write_report),
             self.folder.write("write_model", write_model),
-            None,
-            None,
-            False,
-            False,
+            signals=None,
+            posterior=None,
+            remainder=None,
+            next_experiment=None,
+            to_show=False,
+            force=False,
         )
         settings = Settings(
             seed=seed,

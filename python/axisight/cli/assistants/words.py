@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import resources
 
 from axisight.cli.assistants.folder import Folder
-from axisight.cli.summary import can_be_designed
+from axisight.cli.summary import can_be_designed, motions
 from axisight.gap import Diagnosis
 
 INSTRUCTIONS = """\
@@ -32,8 +32,8 @@ def next_calls(found: Diagnosis, number: str, folder: Folder) -> list[str]:
             f"explain {number} with tables=true lists the smallest effects these logs would show."
         )
         return [*out, "Nothing to correct.", *([limits] if found.detection_limits else [])]
-    if found.verdict == "undecidable" and can_be_designed(found):
-        out.append(f"next_experiment {number} designs the motion that tells the causes apart.")
+    if can_be_designed(found):
+        out.append(f"next_experiment {number} designs {motions(found)}.")
     elif found.causes and folder.may_write:
         out.append("diagnose with write_model writes the simulator with the causes.")
     out.append(f"explain {number} says how the verdict came about.")

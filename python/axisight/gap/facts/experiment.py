@@ -12,6 +12,8 @@ from axisight.display.summary import summarized
 from axisight.effects import Effect
 from axisight.excitation import References, write_references
 from axisight.gap.facts.axis_names import placed
+from axisight.gap.facts.wording import listed
+from axisight.paths import JointTrajectory, write_joint_trajectory
 from axisight.storage import write_whole
 
 # Log-likelihood ratio at which the wrong rival has a probability below 5 %.
@@ -27,16 +29,19 @@ _AS_WELL, _NEVER = 1.5, 90.0
 class Plan:
     """A motion, and how often to run it.
 
-    ``motion``: what moves, in words; ``axes`` (from 1) that move; ``references``: one period of it,
-    motor side; ``repeats``: how often to run it. ``times_shorter``: how many times as long a standard
-    multisine on all axes would have to be to tell as much, may be infinite.
+    - ``motion``: what moves, in words; ``axes`` (from 1) that move; ``repeats``: how often to run it.
+    - ``references``: velocity references of the motors, from rest to rest; ``trajectory``: the same motion as positions
+      of the joints.
+    - ``times_shorter``: how many times as long the motion ``usual`` would have to be to tell as much, may be infinite.
     """
 
     motion: str
     axes: tuple[int, ...]
     references: References
+    trajectory: JointTrajectory
     repeats: int
     times_shorter: float
+    usual: str = "A multisine on all axes"
 
     def __str__(self) -> str:
         """What moves, where and how long."""
@@ -45,19 +50,25 @@ class Plan:
         often = "" if self.repeats == 1 else f", {self.repeats} times"
         return f"{self.motion}, {where}, {self.references.period_s:g} s{often}"
 
-    def beside_a_multisine(self) -> str:
-        """Return how a multisine compares, in a sentence."""
+    def beside_the_usual(self) -> str:
+        """Return how the usual motion compares, in a sentence."""
         if self.times_shorter > _NEVER:
-            return "A multisine on all axes would not show it."
+            return f"{self.usual} would not show it."
         if self.times_shorter < _AS_WELL:
-            return "A multisine on all axes is as good."
-        return f"A multisine on all axes would need {self.times_shorter:.2g} times the time."
+            return f"{self.usual} is as good."
+        return f"{self.usual} would need {self.times_shorter:.2g} times the time."
+
+    def write(self, folder: Path | str, prefix: str = "") -> list[Path]:
+        """Write references and trajectory into a folder, and return the paths."""
+        parquet, csv, ros = motion_files(folder, prefix)
+        write_references(self.references, parquet)
+        return [parquet, *(write_joint_trajectory(self.trajectory, path) for path in (csv, ros))]
 
 
 @summarized
 @dataclass(frozen=True, eq=False)
 class Experiment(ABC):
-    """References that answer a question: `SeparatingExperiment` or `ShowingExperiment`."""
+    """Motions that answer a question: `SeparatingExperiment`, `ShowingExperiment` or `RecordExperiment`."""
 
     plan: Plan
 
@@ -81,45 +92,57 @@ class Experiment(ABC):
         """What to do and what it tells, in a sentence or two."""
 
     def write(self, folder: Path | str) -> list[Path]:
-        """Write ``references.parquet`` and ``experiment.txt`` into a folder; return their paths.
+        """Write the motion and ``experiment.txt`` into a folder; return their paths.
 
-        Raises InputError where they cannot be written.
+        The motion stands in ``references.parquet`` as velocity references of the motors, and in ``trajectory.csv`` and
+        ``trajectory.yaml`` (a ROS 2 JointTrajectory) as positions of the joints. Raises InputError where they cannot
+        be written.
         """
-        samples, text = experiment_files(folder)
-        write_references(self.references, samples)
+        return [*self._write_motions(folder), self._write_text(folder)]
+
+    def _write_motions(self, folder: Path | str) -> list[Path]:
+        return self.plan.write(folder)
+
+    def _write_text(self, folder: Path | str) -> Path:
+        text = Path(folder) / _TEXT
         write_whole(text, f"{self}\n")
-        return [samples, text]
+        return text
 
 
 @summarized
 @dataclass(frozen=True, eq=False)
 class SeparatingExperiment(Experiment):
-    """References that tell two rivals apart.
+    """Motions that tell rivals apart.
 
-    ``rivals``: labels ``effect@axis``; ``log_ratio``: log-likelihood ratio of the true rival to the other
-    to expect, whichever is true.
+    ``rivals``: labels ``effect@axis``, the named cause first; ``log_ratio``: log-likelihood ratio of the true rival to
+    any other to expect, whichever is true, but for ``alike``: pairs of rivals that this motion does not tell apart.
     """
 
-    rivals: tuple[str, str]
+    rivals: tuple[str, ...]
     log_ratio: float
+    alike: tuple[tuple[str, ...], ...] = ()
 
     @property
     def decides(self) -> bool:
-        """Whether the wrong rival would be seen to be wrong."""
+        """Whether the wrong rivals would be seen to be wrong."""
         return self.log_ratio >= ENOUGH
 
     def __str__(self) -> str:
         """What to do and what it tells, in a sentence or two."""
-        one, other = (placed(label) for label in self.rivals)
+        one, *others = (placed(label) for label in self.rivals)
+        other = listed(others, "and")
         if not self.decides:
             return (
                 f"No motion within the limits of speed, travel and torque tells {one} from {other}. "
                 f"The best one tried ({_begun_small(self.plan)}) makes the true one "
                 f"{np.exp(self.log_ratio):.2g} times as likely."
             )
+        still = "".join(
+            f" It does not tell {listed([placed(x) for x in pair], 'from')}." for pair in self.alike
+        )
         return (
             f"{self.plan}: tells {one} from {other}. The true one is then at least "
-            f"{min(np.exp(self.log_ratio), 1e6):.2g} times as likely. {self.plan.beside_a_multisine()}"
+            f"{min(np.exp(self.log_ratio), 1e6):.2g} times as likely.{still} {self.plan.beside_the_usual()}"
         )
 
 
@@ -156,13 +179,79 @@ class ShowingExperiment(Experiment):
         named = "" if self.share >= NAMED else " It may be seen without being named."
         return (
             f"{self.plan}: shows {what} if it is there. The smallest size that would show with 95 % "
-            f"probability is {100 / self.share:.0f} % of it.{named} {self.plan.beside_a_multisine()}"
+            f"probability is {100 / self.share:.0f} % of it.{named} {self.plan.beside_the_usual()}"
         )
 
 
-def experiment_files(folder: Path | str) -> tuple[Path, Path]:
-    """Return what `Experiment.write` writes into a folder: the references, and what they are for."""
-    return Path(folder) / "references.parquet", Path(folder) / "experiment.txt"
+@summarized
+@dataclass(frozen=True, eq=False)
+class KnownLoad:
+    """A load for a run: ``mass_kg`` [kg], ``centre_m`` its centre (x, y, z) [m] in the frame of the last link."""
+
+    mass_kg: float
+    centre_m: tuple[float, float, float]
+
+
+@summarized
+@dataclass(frozen=True, eq=False)
+class RecordExperiment(Experiment):
+    """A record with what a diagnosis needs if no hypothesis fits, or if its detection limits are too coarse.
+
+    - ``plan``: a rich motion that is run several times. The differences between the runs are the noise.
+    - ``slow``: triangles of position, which show friction in both directions over the whole travel.
+    - ``loaded``: the rich motion with ``load``, which tells the torque's scale from masses.
+    """
+
+    slow: Plan
+    loaded: Plan
+    load: KnownLoad | None
+
+    @property
+    def decides(self) -> bool:
+        """True: a record is worth running whatever it shows."""
+        return True
+
+    def __str__(self) -> str:
+        """What to do and what it tells, in a few sentences."""
+        parts = [
+            f"A record of three motions. Repeat ({_begun_small(self.plan)}): what differs between the runs is noise.",
+            f"Slow ({_begun_small(self.slow)}): friction in both directions.",
+        ]
+        if self.load is None:
+            parts.append(
+                f"Loaded ({_begun_small(self.loaded)}): fix a load that you have weighed. These limits of torque leave "
+                f"room for a small one only."
+            )
+        else:
+            x, y, z = self.load.centre_m
+            parts.append(
+                f"Loaded ({_begun_small(self.loaded)}): fix a load that you have weighed, near {self.load.mass_kg:.2g} "
+                f"kg with its centre at ({x:.3g}, {y:.3g}, {z:.3g}) m of the last link. Diagnose this log by itself, "
+                f"with --payload."
+            )
+        return " ".join(parts)
+
+    def _write_motions(self, folder: Path | str) -> list[Path]:
+        plans = zip(_RECORD, (self.plan, self.slow, self.loaded), strict=True)
+        return [path for prefix, plan in plans for path in plan.write(folder, prefix)]
+
+
+# Text of an experiment; prefixes of the three motions of a record, and all prefixes.
+_TEXT = "experiment.txt"
+_RECORD = ("repeat_", "slow_", "loaded_")
+
+
+def motion_files(folder: Path | str, prefix: str = "") -> tuple[Path, Path, Path]:
+    """Return what `Plan.write` writes: velocity references, joint positions as CSV, the same as a ROS message."""
+    names = ("references.parquet", "trajectory.csv", "trajectory.yaml")
+    first, second, third = (Path(folder) / f"{prefix}{name}" for name in names)
+    return first, second, third
+
+
+def experiment_files(folder: Path | str) -> list[Path]:
+    """Return all files that `Experiment.write` may write into a folder."""
+    motions = (path for prefix in ("", *_RECORD) for path in motion_files(folder, prefix))
+    return [*motions, Path(folder) / _TEXT]
 
 
 def _begun_small(plan: Plan) -> str:

@@ -19,7 +19,7 @@ from axisight.gap.facts.faults import Finding
 from axisight.gap.prepare.run_up import NotRunUpError, begins_in_motion, run_up_to
 from axisight.gap.prepare.used_part import NOISES
 from axisight.gap.signals.noise import position_noise_std
-from axisight.gap.simulator.start_poses import at_their_poses
+from axisight.gap.simulator.start_poses import at_their_poses, start_of
 from axisight.logs import Log
 from axisight.robot import Robot
 from axisight.robot.robot import TOLD_POSITIONS
@@ -86,6 +86,11 @@ class Commanded:
                 replace(log, position_rad=position, torque_nm=torque, velocity_rad_s=velocity)
             )
         return replace(self, logs=tuple(told))
+
+    def along_targets(self, log: Log) -> Log:
+        """Return a log of targets at the logged rate, from rest, with references at the controller's rate and start."""
+        told = _commanded(self.robot, log, self.step)
+        return replace(told, start_rad=start_of(self.robot, log.position_rad[0]))
 
     def fine(self, values: Array) -> Array:
         """Return a signal (n, n_axes) of the logs' rate at the controller's rate, by a cubic spline."""

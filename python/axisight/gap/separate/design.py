@@ -3,76 +3,116 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.excitation import References
 from axisight.fitting.divergence import must_hold
 from axisight.gap.facts.experiment import Experiment, Plan
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
-from axisight.gap.separate.question import Question, Seen, Turn
-from axisight.gap.separate.waves import Motion, Range, motions, standard
-from axisight.gap.simulator.own_parameters import with_values
-from axisight.gap.views.closed_loop import ClosedLoopFitter, ClosedLoopView, Record
-from axisight.simulation import simulate_batch
+from axisight.gap.fit.model_fitter import ModelFitter
+from axisight.gap.separate.question import Question, Seen
+from axisight.gap.separate.route import Route, Runs
+from axisight.gap.separate.waves import Motion
 
 Array = NDArray[np.float64]
 
-# Largest torque of a motion, relative to the largest one seen or allowed.
-_MARGIN = 1.05
 # Motions that are evaluated again one by one, with exact weights.
 _FINALISTS = 6
-# Smallest and largest number of runs of a motion, and the largest number for the standard motion that is compared. At
+# Rounds in which variants of the best motion are tried.
+_ROUNDS = 3
+# Smallest and largest number of runs of a motion, and the largest number for the usual motion that is compared. At
 # least two, because a diagnosis leaves each log out in turn and does not believe a single run.
 _TWICE, _REPEATS, _FOR_EVER = 2, 10, 1000
 
 
-@dataclass(frozen=True, eq=False)
-class _Runs:
-    """Simulated runs of a machine along every motion, and whether its torque stays within the limits.
+class _Tried:
+    """The motions tried so far, and what they show at the weights of the logs.
 
-    ``records``: motor angles and torques (n, n_axes) of each motion; ``possible`` (n_motions,).
+    The first ``n_aside`` motions are compared only. ``runs``: of each possible machine along each motion; ``seen``:
+    what each motion shows.
     """
 
-    records: list[Record]
-    possible: NDArray[np.bool_]
+    def __init__(
+        self, route: Route, question: Question, first: Sequence[Motion], n_aside: int
+    ) -> None:
+        self._route, self.question, self._n_aside = route, question, n_aside
+        self.motions: list[Motion] = list(first)
+        self.runs = self._run(first)
+        self.seen = self._seen_of(first, self.runs)
+        self.question = question.narrowed(self.seen[n_aside:], _REPEATS)
+
+    def add(self, more: Sequence[Motion]) -> None:
+        """Run motions and evaluate them together."""
+        runs = self._run(more)
+        self.runs = [_both(a, b) for a, b in zip(self.runs, runs, strict=True)]
+        self.seen += self._seen_of(more, runs)
+        self.motions += more
+
+    @property
+    def worth(self) -> Array:
+        """The worth of each motion (n_motions,) for the question."""
+        return np.array([self.question.worth(x) for x in self.seen])
+
+    def best(self, count: int) -> list[int]:
+        """Return the best motions that are not compared only, the best first."""
+        order = np.argsort(-self.worth, kind="stable")
+        return [int(k) for k in order if k >= self._n_aside][:count]
+
+    def alone(self, which: Sequence[int]) -> dict[int, list[Seen]]:
+        """Return what some motions show, each with the weights that it gives."""
+        return _seen(self._route, self.question, self.runs, which, alone=True)
+
+    def _run(self, motions: Sequence[Motion]) -> list[Runs]:
+        """Return the runs of the machine of each turn; a machine of several turns runs once."""
+        turns = self.question.turns
+        machines = {id(turn.machine): turn.machine for turn in turns}
+        runs = {key: self._route.runs(machine, motions) for key, machine in machines.items()}
+        return [runs[id(turn.machine)] for turn in turns]
+
+    def _seen_of(self, motions: Sequence[Motion], runs: Sequence[Runs]) -> list[list[Seen]]:
+        seen = _seen(self._route, self.question, runs, range(len(motions)), alone=False)
+        return [seen[k] for k in range(len(motions))]
 
 
-def designed(view: ClosedLoopView, question: Question, limits: Range) -> Experiment:
-    """Return the motion within ``limits`` that answers a question best, with the number of runs that it needs.
+def designed(route: Route, question: Question) -> Experiment:
+    """Return the motion that answers a question best, with the number of runs that it needs.
 
     Each possible machine is simulated along each motion. The alternative model is fitted to that run in one linear
     step, with what the logs already say about its parameters as a prior.
     """
-    widest = 0.8 * min(view.settings.bandwidth_hz, 0.5 / view.robot.sample_time_s)
-    time, seed = view.robot.sample_time_s, view.settings.seed
-    axes = question.axes or tuple(view.robot.axis_numbers())
-    usual = standard(limits, time, seed)
-    tried = [*usual, *motions(limits, axes, time, widest, seed)]
-    runs = [_runs(view, turn.machine, tried, limits.torque) for turn in question.turns]
-    rough = _seen(view, question.turns, runs, range(len(tried)), alone=False)
-    worth = np.array([question.worth(rough[k]) for k in range(len(tried))])
-    best_usual = int(np.argmax(worth[: len(usual)]))
-    order = np.argsort(-worth, kind="stable")[:_FINALISTS]
+    axes = question.axes or tuple(route.view.robot.axis_numbers())
+    usual = route.usual_motions()
+    aside = 0 if route.offers_usual else len(usual)
+    tried = _Tried(route, question, [*usual, *route.motions(axes)], aside)
+    for k in range(_ROUNDS):
+        if variants := route.improved(tried.motions[tried.best(1)[0]], k):
+            tried.add(variants)
+    best_usual = int(np.argmax(tried.worth[: len(usual)]))
+    finalists = tried.best(_FINALISTS)
     # Weights as they will be with the new log decide between the best motions.
-    finalists = list(dict.fromkeys([best_usual, *order.tolist()]))
-    exact = _seen(view, question.turns, runs, finalists, alone=True)
+    exact = tried.alone(list(dict.fromkeys([best_usual, *finalists])))
+    question = tried.question.narrowed([exact[k] for k in finalists], _REPEATS)
     best = max(finalists, key=lambda k: question.worth(exact[k]))
     repeats = _repeats(question, exact[best], question.enough, _REPEATS)
     expected = question.worth(exact[best], repeats)
     as_much = min(expected, question.enough)
-    chosen = tried[best]
-    design = {"motion": chosen.words, "seed": seed}
-    plan = Plan(
-        chosen.words,
-        chosen.axes,
-        References(time, chosen.reference[None], design=design),
+    shorter = _repeats(question, exact[best_usual], as_much, _FOR_EVER) / repeats
+    return question.answered(planned(route, tried.motions[best], repeats, shorter), expected)
+
+
+def planned(route: Route, motion: Motion, repeats: int, times_shorter: float = 1.0) -> Plan:
+    """Return the plan of a motion."""
+    return Plan(
+        motion.words,
+        motion.axes,
+        route.references(motion),
+        route.trajectory(motion),
         repeats,
-        _repeats(question, exact[best_usual], as_much, _FOR_EVER) / repeats,
+        times_shorter,
+        route.usual,
     )
-    return question.answered(plan, expected)
 
 
 def _repeats(question: Question, seen: Sequence[Seen], enough: float, most: int) -> int:
@@ -81,31 +121,18 @@ def _repeats(question: Question, seen: Sequence[Seen], enough: float, most: int)
     return next(tried, most)
 
 
-def _runs(
-    view: ClosedLoopView, machine: FittedModel, tried: Sequence[Motion], most: Array
-) -> _Runs:
-    robot = with_values(view.robot, machine.robot_values)
-    out = simulate_batch(
-        robot,
-        np.stack([m.reference for m in tried]),
-        effects=list(machine.effects),
-        method="rk4",
-        threads=view.settings.threads,
+def _both(first: Runs, second: Runs) -> Runs:
+    return Runs(
+        [*first.records, *second.records],
+        [*first.torques, *second.torques],
+        np.concatenate([first.possible, second.possible]),
     )
-    angle, torque = out["position_rad"].values, out["torque_cmd_nm"].values
-    # A run that diverged is NaN, and counts as infinite torque.
-    size = np.nan_to_num(np.abs(torque), nan=np.inf).max(axis=1)
-    records: list[Record] = [
-        (np.ascontiguousarray(q), np.ascontiguousarray(u), np.ones_like(u), None, 0)
-        for q, u in zip(angle, torque, strict=True)
-    ]
-    return _Runs(records, (size <= _MARGIN * most).all(axis=1))
 
 
 def _seen(
-    view: ClosedLoopView,
-    turns: Sequence[Turn],
-    runs: Sequence[_Runs],
+    route: Route,
+    question: Question,
+    runs: Sequence[Runs],
     which: Sequence[int],
     *,
     alone: bool,
@@ -114,30 +141,32 @@ def _seen(
 
     ``alone``: evaluate each motion with the weights from its own torque.
     """
-    n_axes = view.robot.n_axes
+    turns, n_axes = question.turns, route.view.robot.n_axes
     nothing = Seen(np.zeros(n_axes), np.zeros(n_axes), 0.0)
     out = {k: [nothing] * len(turns) for k in which}
     here = [k for k in which if all(r.possible[k] for r in runs)]
     together = [here] if here else []
-    for place, (run, turn) in enumerate(zip(runs, turns, strict=True)):
-        for group in [[k] for k in here] if alone else together:
-            own = view.weighting_with(run.records[group[0]][1]) if alone else None
-            fitter = view.fitter.along([run.records[k] for k in group], own)
+    for group in [[k] for k in here] if alone else together:
+        # What a machine shows without the effects in question is the same for all rivals.
+        shown: dict[tuple[int, tuple[Hypothesis, ...]], Array] = {}
+        for place, (run, turn) in enumerate(zip(runs, turns, strict=True)):
+            fitter = route.fitter(run, group, alone=alone)
             left, samples = _left(fitter, turn.other, turn.free, n_axes)
-            there = left
-            if turn.neither != turn.free:
-                there, _ = _left(fitter, turn.other, turn.neither, n_axes)
-            for k, a, b in zip(group, left, there, strict=True):
-                out[k][place] = Seen(a, b, samples)
+            key = (id(turn.machine), turn.neither)
+            if key not in shown:
+                same = turn.neither == turn.free
+                shown[key] = left if same else _left(fitter, turn.other, turn.neither, n_axes)[0]
+            for k, a, b, n in zip(group, left, shown[key], samples, strict=True):
+                out[k][place] = Seen(a, b, n)
     return out
 
 
 def _left(
-    fitter: ClosedLoopFitter, model: FittedModel, free: Sequence[Hypothesis], n_axes: int
-) -> tuple[Array, float]:
+    fitter: ModelFitter, model: FittedModel, free: Sequence[Hypothesis], n_axes: int
+) -> tuple[Array, list[float]]:
     """Return what a model with the effects ``free`` leaves of each run, as mean squares (n_runs, n_axes).
 
-    The second value is the number of residuals of an axis.
+    The second value is the number of residuals of an axis in each run.
     """
     # Sensitivities along other logs cannot be reused.
     start = replace(model, columns={})
@@ -149,12 +178,14 @@ def _left(
     order = [model.parameters.index(p) for p in names]
     held = found.prior_matrix.copy()
     held[np.ix_(mine, mine)] = known[np.ix_(order, order)]
-    out = []
+    out, counts = [], []
     for run in range(int(found.log.max()) + 1):
         here = found.log == run
         matrix, gradient = found.matrix[here], found.gradient[here]
         step = -np.linalg.lstsq(matrix.sum(axis=0) + held, gradient.sum(axis=0), rcond=1e-12)[0]
         loss = found.loss[here] + 2 * gradient @ step + np.einsum("bij,i,j->b", matrix, step, step)
         samples = np.bincount(found.axis[here], found.samples[here], n_axes)
-        out.append(np.maximum(np.bincount(found.axis[here], loss, n_axes) / samples, 0.0))
-    return np.array(out), float(samples.min())
+        left = np.bincount(found.axis[here], loss, n_axes) / np.maximum(samples, 1.0)
+        out.append(np.maximum(left, 0.0))
+        counts.append(float(samples.min()))
+    return np.array(out), counts

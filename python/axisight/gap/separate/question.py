@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,9 @@ class Question(Protocol):
 
     def worth(self, seen: Sequence[Seen], repeats: int = 1) -> float:
         """Return the worth of a motion with this many runs, from what it shows for each possible truth."""
+
+    def narrowed(self, seen: Sequence[Sequence[Seen]], repeats: int) -> Self:
+        """Return the part of the question that one of the motions answers in ``repeats`` runs; all if none does."""
 
     def answered(self, plan: Plan, worth: float) -> Experiment:
         """Return the planned experiment with its worth."""

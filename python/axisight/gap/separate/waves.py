@@ -9,11 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from axisight.errors import InputError
 from axisight.excitation import multisine, square
-from axisight.excitation.checks import per_item
+from axisight.gap.separate.limits import Range
 from axisight.logs import Log
 
 Array = NDArray[np.float64]
@@ -31,70 +30,34 @@ _FADE_S = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A motion to try: ``reference`` (n, n_axes) [rad/s], motor side; ``axes`` (from 1) that move."""
+    """A motion to try: ``reference`` (n, n_axes) [rad/s], motor side; ``axes`` (from 1) that move.
+
+    ``start`` (n_axes,): the motors at its start [rad]; None for the start that most motions share.
+    """
 
     words: str
     axes: tuple[int, ...]
     reference: Array
+    start: Array | None = None
 
 
-@dataclass(frozen=True)
-class ExperimentLimits:
-    """Limits of the motors in an experiment, in place of the ranges seen in the logs; None keeps the seen range.
+def seen_range(logs: Sequence[Log]) -> Range:
+    """Return the range of the motors in logs with velocity references, from where each log begins.
 
-    Largest absolute values on the motor side, one number for all axes or one for each: ``velocity_rad_s`` of the
-    reference, ``travel_rad`` from the start of the experiment, ``torque_nm``.
-    """
-
-    velocity_rad_s: ArrayLike | None = None
-    travel_rad: ArrayLike | None = None
-    torque_nm: ArrayLike | None = None
-
-
-@dataclass(frozen=True)
-class Range:
-    """Range of the motors: ``speed`` [rad/s], travel ``back`` and ``forth`` [rad], ``torque`` [Nm], (n_axes,) each."""
-
-    speed: Array
-    back: Array
-    forth: Array
-    torque: Array
-
-
-def seen_range(logs: Sequence[Log], limits: ExperimentLimits | None = None) -> Range:
-    """Return the range of the motors in logs, from where each log begins, with ``limits`` in place of what was seen.
-
-    Raises InputError for limits that are not positive, or whose number is neither one nor that of the axes.
+    Accelerations have no limit: those of the references are steps.
     """
     speeds, turned = [], []
     for log in logs:
         assert log.velocity_ref_rad_s is not None  # closed loop only
         speeds.append(np.abs(log.velocity_ref_rad_s).max(axis=0))
         turned.append(log.position_rad - log.position_rad[0])
-    seen = Range(
-        np.max(speeds, axis=0),
+    speed = np.max(speeds, axis=0)
+    return Range(
+        speed,
         np.min([x.min(axis=0) for x in turned], axis=0),
         np.max([x.max(axis=0) for x in turned], axis=0),
         np.max([np.abs(log.torque_nm).max(axis=0) for log in logs], axis=0),
-    )
-    return seen if limits is None else _stated(seen, limits)
-
-
-def _stated(seen: Range, limits: ExperimentLimits) -> Range:
-    """Return the seen range with the stated limits in its place."""
-    given: dict[str, Array] = {}
-    for name, value in vars(limits).items():
-        if value is not None:
-            field = f"limits of the experiment, {name}"
-            given[name] = per_item(field, value, len(seen.speed))
-            if np.any(given[name] <= 0):
-                raise InputError(f"{field}: expected positive numbers, got {value}")
-    travel = given.get("travel_rad")
-    return Range(
-        given.get("velocity_rad_s", seen.speed),
-        seen.back if travel is None else -travel,
-        seen.forth if travel is None else travel,
-        given.get("torque_nm", seen.torque),
+        np.full(len(speed), np.inf),
     )
 
 

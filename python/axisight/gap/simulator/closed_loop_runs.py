@@ -50,6 +50,18 @@ def simulated_run(robot: Robot, variant: Variant, log: Log) -> tuple[Array, Arra
     return out["torque_cmd_nm"].values[0, lead:], out["position_rad"].values[0, lead:]
 
 
+def simulated_runs(
+    robot: Robot, variant: Variant, logs: Sequence[Log], *, threads: int = 0
+) -> tuple[list[Array], list[Array]]:
+    """Return torques [Nm] and positions [rad] of runs along the references of each log, (n, n_axes) each."""
+    out = _runs(with_values(robot, variant.robot_values), logs, threads, variant.effects)
+    torque, position = (
+        [out[signal].values[i, log.lead : log.lead + log.n_samples] for i, log in enumerate(logs)]
+        for signal in ("torque_cmd_nm", "position_rad")
+    )
+    return torque, position
+
+
 def _along(
     robot: Robot,
     logs: Sequence[Log],

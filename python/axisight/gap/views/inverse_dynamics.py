@@ -54,6 +54,7 @@ _STEP = 1e-3
 class InverseView(View):
     """Compares the measured torque with that predicted from the measured motion."""
 
+    fitter: InverseDynamicsFitter
     feels_steps: ClassVar[bool] = False
     """False: torque and motion both contain the loop's response to encoder steps.
 
@@ -92,7 +93,7 @@ class InverseView(View):
         fitter = InverseDynamicsFitter(
             robot,
             motions,
-            self._certain(logs, motions, floor),
+            self._certain([self.whole(log) for log in logs], motions, floor.weighting),
             floor.weighting,
             settings.tolerances_of(robot),
             block_s(logs, self.filtering.cutoff_hz, settings),
@@ -105,17 +106,49 @@ class InverseView(View):
         """Weight of each sample of the estimation logs in fits (n, n_axes)."""
         self.unfelt = other_controllers_of_targets(robot, logs)
 
-    def _certain(self, logs: Sequence[Log], motions: Sequence[Motion], floor: Floor) -> list[Array]:
-        """Return the certainty of each sample of the estimation logs (n, n_axes); zero if it does not count."""
+    def _certain(
+        self, whole: Sequence[Array], motions: Sequence[Motion], weighting: Weighting
+    ) -> list[Array]:
+        """Return the certainty of each sample of logs (n, n_axes); zero if it does not count."""
         found = certainties(
             motions,
             self._dry_friction_nm,
-            floor.weighting,
+            weighting,
             lambda x: self.filtering.spread(x, self._sample_time_s),
         )
-        # Next to an end in motion, the low-pass mixes in padding: the fit leaves these samples out.
-        whole = [np.floor(self.filtering.counted(log))[:, None] for log in logs]
         return [certain * counts for certain, counts in zip(found, whole, strict=True)]
+
+    def whole(self, log: Log) -> Array:
+        """Return whether each sample of a log counts (n, 1), as 1 or 0.
+
+        Next to an end in motion, the low-pass mixes in padding: the fit leaves these samples out.
+        """
+        return np.asarray(np.floor(self.filtering.counted(log))[:, None])
+
+    def weighting_with(self, torque_nm: Array) -> Weighting:
+        """Return the weighting that results if a log with this torque (n, n_axes) [Nm] is added."""
+        noise, share = self.floor.noise[:, 0], self.settings.model_error**2
+        variance = [np.var(log.torque_nm, axis=0) for log in self.logs]
+        before, after = (
+            noise + share * np.mean(each, axis=0)
+            for each in (variance, [*variance, np.var(torque_nm, axis=0)])
+        )
+        weighting = self.floor.weighting
+        factor = np.sqrt(before / np.maximum(after, 1e-300))
+        return replace(weighting, weight=weighting.weight * factor[:, None])
+
+    def fitter_along(
+        self,
+        motions: Sequence[Motion],
+        whole: Sequence[Array],
+        weighting: Weighting | None = None,
+    ) -> InverseDynamicsFitter:
+        """Return the fitter for motions in place of the logs, with another ``weighting`` if given.
+
+        ``whole``: whether the samples of each motion count, as of `whole`.
+        """
+        used = self.floor.weighting if weighting is None else weighting
+        return self.fitter.along(motions, self._certain(whole, motions, used), used)
 
     def _as_rigid(self, robot: Robot, log: Log) -> Motion:
         """Return the motion of a log, and its torque without the deflection of the gears."""
@@ -295,8 +328,22 @@ class InverseDynamicsFitter(ModelFitter):
     ) -> None:
         super().__init__(robot, weighting, tolerances, block_s)
         self.certainty = list(certainty)
-        records = [(*m, c) for m, c in zip(motions, certainty, strict=True)]
-        self.motions = _core.MeasuredMotions(robot.core, records, weighting.core(), block_s=block_s)
+        self.motions = self._made_ready(motions)
+
+    def _made_ready(self, motions: Sequence[Motion]) -> _core.MeasuredMotions:
+        """Return motions in the form of the core."""
+        records = [(*m, c) for m, c in zip(motions, self.certainty, strict=True)]
+        weighting = self.weighting.core()
+        return _core.MeasuredMotions(self.robot.core, records, weighting, block_s=self.block_s)
+
+    def along(
+        self, motions: Sequence[Motion], certainty: Sequence[Array], weighting: Weighting
+    ) -> InverseDynamicsFitter:
+        """Return the same fitter for other motions, with their certainty and weighting."""
+        other = copy(self)
+        other.certainty, other.weighting = list(certainty), weighting
+        other.motions = other._made_ready(motions)
+        return other
 
     def _keep(self, logs: Sequence[int]) -> None:
         self.certainty = [self.certainty[i] for i in logs]

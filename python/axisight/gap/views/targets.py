@@ -25,7 +25,7 @@ from axisight.gap.facts.simulator_variant import AS_GIVEN, Variant
 from axisight.gap.prepare.position_targets import Commanded
 from axisight.gap.search.state import SearchState
 from axisight.gap.signals.noise import Floor, position_noise_std, torque_density
-from axisight.gap.simulator.closed_loop_runs import simulated_positions
+from axisight.gap.simulator.closed_loop_runs import simulated_positions, simulated_runs
 from axisight.gap.simulator.own_parameters import uncertain_gains
 from axisight.gap.views.closed_loop import ClosedLoopFitter, Record
 from axisight.gap.views.tracking_weights import shortest
@@ -132,6 +132,27 @@ class TargetsView(View):
         """Return the gain of the controller for an error of position (n_axes, n_freq) [Nm/rad]."""
         f = np.maximum(frequency_hz, frequency_hz[1])
         return told_gain(self._commanded.robot, f)
+
+    def weighting_with(self, torque_nm: Array) -> Weighting:
+        """Return the weighting that results if a log with these commands (n, n_axes) [Nm] is added."""
+        time = self.robot.sample_time_s
+        added = Log(
+            name="added",
+            source=self.logs[0].source,
+            sample_time_s=time,
+            time_s=np.asarray(time * np.arange(len(torque_nm)), np.float64),
+            torque_nm=torque_nm,
+            position_rad=np.zeros_like(torque_nm),
+        )
+        return self._floor(self.robot, [*self.logs, added], self.settings).weighting
+
+    def along_targets(self, log: Log) -> Log:
+        """Return a log of targets at the logged rate, from rest, with the references of the controller at its rate."""
+        return self._commanded.along_targets(log)
+
+    def simulated(self, variant: Variant, logs: Sequence[Log]) -> tuple[list[Array], list[Array]]:
+        """Return commands [Nm] and positions [rad] of a simulator on logs (n, n_axes), at the controller's rate."""
+        return simulated_runs(self.robot, variant, logs, threads=self.settings.threads)
 
     def response(self, effect: str, axis: int, frequency_hz: Array) -> Complex:
         """Return the response of the loop's position to an effect (n_freq,)."""

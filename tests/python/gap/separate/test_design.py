@@ -14,6 +14,7 @@ from axisight.gap.facts.experiment import Experiment
 from axisight.gap.fit.data_blocks import layout_of
 from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.separate.design import designed
+from axisight.gap.separate.loop_route import LoopRoute
 from axisight.gap.separate.question import Seen
 from axisight.gap.separate.rivals import Rivals
 from axisight.gap.separate.waves import SECONDS, motions, seen_range, standard
@@ -65,7 +66,7 @@ def rivals(view: ClosedLoopView, one: Effect, other: Effect) -> Rivals:
 
 
 def separating_of(view: ClosedLoopView, both: Rivals) -> Experiment:
-    return designed(view, both, seen_range(view.logs))
+    return designed(LoopRoute(view), both)
 
 
 def test_what_is_open_is_decided_by_the_experiment(open_case: Diagnosis, logs: list[Log]):

@@ -11,6 +11,7 @@ from axisight.cli import app
 from axisight.excitation import read_references
 from axisight.gap import ExperimentLimits
 from axisight.gap.facts.experiment import Experiment, ShowingExperiment
+from axisight.gap.separate.limits import Range, within_limits
 from axisight.gap.separate.waves import seen_range
 from gap_data import bare_axis, bare_case, log_of, scattered
 
@@ -93,11 +94,16 @@ def test_it_stays_within_limits(before: Diagnosis):
 
 def test_limits_take_the_place_of_what_was_seen():
     logs = logs_of([])
-    seen, stated = seen_range(logs), seen_range(logs, LIMITS)
+    seen = seen_range(logs)
+
+    def limited(limits: ExperimentLimits) -> Range:
+        return within_limits(seen, limits, bare_axis(), np.zeros(1))
+
+    stated = limited(LIMITS)
     assert seen.speed[0] < 2.0
     assert (stated.speed.tolist(), stated.torque.tolist()) == ([10.0], [20.0])
     assert (stated.back, stated.forth) == (seen.back, seen.forth)
-    further = seen_range(logs, ExperimentLimits(travel_rad=[7.0]))
+    further = limited(ExperimentLimits(travel_rad=[7.0]))
     assert (further.back.tolist(), further.forth.tolist()) == ([-7.0], [7.0])
     assert (further.speed, further.torque) == (seen.speed, seen.torque)
 
