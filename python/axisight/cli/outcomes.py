@@ -35,6 +35,8 @@ def write_found_remainder(found: Diagnosis, target: Path) -> None:
         return
     save_remainder(left.modelled.model, target, overwrite=True)
     say(f"remainder: {target}")
+
+
 def write_found_posterior(found: Diagnosis, target: Path) -> None:
     """Write the posterior of a diagnosis; print the path and how much held-out torque its band holds."""
     assert found.posterior is not None

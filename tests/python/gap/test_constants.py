@@ -4,8 +4,10 @@ from pathlib import Path
 
 from axisight.gap.constants import constants, main
 
-# So many there are. A rule that needs one more has to find another that nothing needs.
-MOST = 385
+# So many decide. A rule that needs one more has to find another that nothing needs.
+MOST = 375
+# Rooms that act after the verdict and cannot change it: next experiments, remainder, posterior.
+AFTER = ("separate/", "modelled/", "uncertainty/")
 
 
 def test_every_constant_says_what_it_rests_on():
@@ -13,8 +15,9 @@ def test_every_constant_says_what_it_rests_on():
     assert silent == []
 
 
-def test_constants_do_not_become_more():
-    assert len(constants()) <= MOST
+def test_constants_that_decide_do_not_become_more():
+    deciding = [c for c in constants() if not c.place.startswith(AFTER)]
+    assert len(deciding) <= MOST
 
 
 def test_the_command_prints_where_each_stands(capsys):

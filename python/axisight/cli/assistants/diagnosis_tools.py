@@ -197,9 +197,9 @@ class DiagnosisTools:
         torque_limit_nm: fields.TorqueLimits = None,
         write_to: fields.WriteExperiment = None,
     ) -> Annotated[CallToolResult, ExperimentAnswer]:
-        """Design the motion that tells the open causes of a diagnosis apart, or that shows an effect.
+        """Design the next experiment after a diagnosis: it tells open causes apart, or shows an effect.
 
-        Needs closed-loop logs with velocity references. Repeats the diagnosis, so takes as long as it did.
+        After an unknown verdict it is a record that shows more. Repeats the diagnosis, so takes as long as it did.
         Limits default to what the logs reach. A person has to check the motion before a robot runs it.
         """
         kept = self._diagnoses.get(diagnosis)

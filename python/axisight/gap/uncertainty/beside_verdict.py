@@ -1,4 +1,4 @@
-"""What is asked for beside a verdict: torques of all logs, the joint posterior of its parameters, a modelled remainder."""
+"""What is asked for beside a verdict: torques of all logs, the joint posterior, a modelled remainder."""
 
 from __future__ import annotations
 
