@@ -84,9 +84,12 @@ def log_of(
     coulomb: Sequence[float] = COULOMB_NM,
     viscous: Sequence[float] = VISCOUS,
     seconds: float = 40.0,
+    held: Sequence[int] = (),
 ) -> Log:
-    """Return a log of a machine like ``robot`` with friction and noise."""
+    """Return a log of a machine like ``robot`` with friction and noise; axes ``held`` (from 0) never move."""
     position, speed, acceleration = motion(seed, seconds)
+    for moved in (position, speed, acceleration):
+        moved[:, list(held)] = 0.0
     rotors = np.array([motor_inertia(mass) for mass in MASSES])
     torque = robot.inverse_dynamics(position, speed, acceleration) + rotors * acceleration
     torque += friction_torque(speed, np.array(coulomb), np.array(viscous))

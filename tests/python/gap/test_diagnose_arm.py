@@ -164,3 +164,10 @@ def test_a_tilted_base_is_one_cause_of_the_arm():
     values = found.causes[0].parameters
     assert values["about_x_rad"].value == pytest.approx(a, rel=0.05)
     assert values["about_y_rad"].value == pytest.approx(b, rel=0.05)
+
+
+def test_an_axis_that_never_moves_does_not_stop_the_diagnosis():
+    """Speeds and travel of such an axis give start values that no law allows; only the moving axes are told."""
+    logs = [log_of(ROBOT, seed, seconds=10.0, held=[0]) for seed in range(3)]
+    found = diagnose(robot=ROBOT, estimation=logs[:2], validation=logs[2:], settings=QUICK)
+    assert {c.axis for c in found.causes if c.effect == "coulomb_friction"} == {2, 3, 4, 5, 6}

@@ -80,10 +80,29 @@ def all_candidates(
     sides = robot.axis_numbers() if inverse_dynamics else one_sided(robot)
     with ThreadPoolExecutor(threads) as pool:
         starts = {**STARTS, **TARGET_STARTS} if by_targets else STARTS
-        found = pool.map(lambda t: starts[t.info.name](t), trials)
+        found = map(_allowed, pool.map(lambda t: starts[t.info.name](t), trials))
         out = [on_the_motor(c) if c.effect.axis in sides else c for c in found if c is not None]
     own = {effect.label: effect for effect in robot.effects if effect.acts}
     return [_from(own[c.effect.label], c) if c.effect.label in own else c for c in out]
+
+
+def _allowed(candidate: Hypothesis | None) -> Hypothesis | None:
+    """Return a candidate without starts that the table of effects does not allow; None if no value is left.
+
+    The speeds and travel of an axis that stands still give such values: its logs cannot show the effect.
+    """
+    if candidate is None or any(low > high for low, high in map(candidate.limits, candidate.free)):
+        return None
+    if not _in_table(candidate, candidate.effect.parameters or {}):
+        return None
+    starts = tuple(start for start in candidate.starts if _in_table(candidate, start))
+    return replace(candidate, starts=starts)
+
+
+def _in_table(candidate: Hypothesis, values: Mapping[str, float]) -> bool:
+    """Whether values of a candidate's parameters lie between the bounds of the table of effects."""
+    table = {p.name: (p.lower, p.upper) for p in effect_info(candidate.effect.name).parameters}
+    return all(table[name][0] <= x <= table[name][1] for name, x in values.items())
 
 
 # Smallest inertia of the arm at a motor, as a share of the rotor's, from which logs tell on which side of the gear
