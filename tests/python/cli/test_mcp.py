@@ -25,6 +25,8 @@ from axisight.gap import Settings, diagnose, verdict_schema
 from axisight.gap.facts.experiment import Plan, ShowingExperiment
 from axisight.logs import check_log, parse_column_map
 from axisight.logs.guessing import guess_columns
+from axisight.paths import joint_trajectory
+from axisight.robot import load_robot
 
 pytest.importorskip("mcp", reason="extra mcp")
 
@@ -212,7 +214,12 @@ def test_the_next_experiment_asks_for_what_it_was_told(folder: Path, found: Any)
     async def ask(client: Client) -> Any:
         await client.call_tool("diagnose", {"case": "case"})
         asked_for = {"diagnosis": "d1", "to_show": "torque_offset@1 offset_nm=1"}
-        limits = {"velocity_limit_rad_s": [10.0], "torque_limit_nm": [1.0, 2.0, 3.0]}
+        limits = {
+            "velocity_limit_rad_s": [10.0],
+            "torque_limit_nm": [1.0, 2.0, 3.0],
+            "acceleration_limit_rad_s2": [50.0],
+            "room_m": [-1.0, -1.0, 0.0, 1.0, 1.0, 2.0],
+        }
         return await client.call_tool("next_experiment", asked_for | limits)
 
     content = good(asked(make_server(folder, run=run), ask))
@@ -222,6 +229,8 @@ def test_the_next_experiment_asks_for_what_it_was_told(folder: Path, found: Any)
     assert second["to_show"].label == "torque_offset@1"
     assert second["within"].velocity_rad_s == 10.0
     assert second["within"].torque_nm == [1.0, 2.0, 3.0]
+    assert second["within"].acceleration_rad_s2 == 50.0
+    assert second["within"].room_m == [-1.0, -1.0, 0.0, 1.0, 1.0, 2.0]
     unknown = called(make_server(folder), "next_experiment", diagnosis="d7")
     assert "none yet: call diagnose first" in refused(unknown)
 
@@ -347,7 +356,8 @@ def test_files_are_written_with_leave(folder: Path, found: Any) -> None:
 
 def test_a_designed_experiment_is_written_with_leave(folder: Path, found: Any) -> None:
     swing = References(0.001, np.array([[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]]))
-    plan = Plan("Slow swings", (1,), swing, repeats=2, times_shorter=np.inf)
+    path = joint_trajectory(swing, load_robot("irb6600_like"), [0.0, 0.0, 0.0])
+    plan = Plan("Slow swings", (1,), swing, path, repeats=2, times_shorter=np.inf)
     made = ShowingExperiment(plan, Effect("torque_offset", 1, {"offset_nm": 1.0}), share=4.0)
 
     def run(separate: bool = False, **_: Any) -> Any:
@@ -361,7 +371,8 @@ def test_a_designed_experiment_is_written_with_leave(folder: Path, found: Any) -
 
     content = good(asked(make_server(folder, may_write=True, run=run), ask))
     assert content["decides"] is True and content["axes"] == [1]
-    assert content["written"] == ["next/references.parquet", "next/experiment.txt"]
+    files = ("references.parquet", "trajectory.csv", "trajectory.yaml", "experiment.txt")
+    assert content["written"] == [f"next/{name}" for name in files]
     assert content["peak_rad_s"] == [2.0, 0.0, 0.0] and content["period_s"] == 0.002
     assert (
         (folder / "next" / "experiment.txt").read_text() == f"{made}\n" == f"{content['advice']}\n"

@@ -32,11 +32,13 @@ from axisight.cli.robot import load_simulator, parse_effect, parse_effects
 from axisight.cli.screen import OUT
 from axisight.cli.show import show_diagnosis
 from axisight.cli.summary import summary
+from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.gap import Diagnosis, ExperimentLimits, Settings
 from axisight.gap.facts.experiment import Experiment, experiment_files
 from axisight.gap.intake.inputs import Inputs, read_inputs
 from axisight.gap.prepare.used_part import Used
+from axisight.gap.separate.asked import LIMITS
 from axisight.gap.simulator.tolerances import with_tolerances
 from axisight.report.account import account
 from axisight.storage import check_targets
@@ -195,6 +197,8 @@ class DiagnosisTools:
         velocity_limit_rad_s: fields.VelocityLimits = None,
         travel_limit_rad: fields.TravelLimits = None,
         torque_limit_nm: fields.TorqueLimits = None,
+        acceleration_limit_rad_s2: fields.AccelerationLimits = None,
+        room_m: fields.Room = None,
         write_to: fields.WriteExperiment = None,
     ) -> Annotated[CallToolResult, ExperimentAnswer]:
         """Design the next experiment after a diagnosis: it tells open causes apart, or shows an effect.
@@ -206,11 +210,15 @@ class DiagnosisTools:
         target = self.folder.write("write_to", write_to)
         if target is not None:
             check_targets({f"write_to, {p.name}": p for p in experiment_files(target)})
-        effect = None if to_show is None else parse_effect(to_show, "to_show").on(kept.inputs.robot)
+        effect: Effect | str | None = to_show
+        if to_show is not None and to_show != LIMITS:
+            effect = parse_effect(to_show, "to_show").on(kept.inputs.robot)
         within = ExperimentLimits(
             velocity_rad_s=_one_or_each(velocity_limit_rad_s),
             travel_rad=_one_or_each(travel_limit_rad),
             torque_nm=_one_or_each(torque_limit_nm),
+            acceleration_rad_s2=_one_or_each(acceleration_limit_rad_s2),
+            room_m=room_m,
         )
         found = await self._diagnoses.run(
             context, kept.inputs, kept.settings, separate=True, to_show=effect, within=within

@@ -112,7 +112,8 @@ ToShow = Annotated[
     str | None,
     _text(
         "Design a motion that shows this effect of this size if the machine has it, such as "
-        "'coulomb_friction@2 coulomb_nm=0.4'. Default: tell the open causes apart."
+        "'coulomb_friction@2 coulomb_nm=0.4'. With 'limits': a record that lowers all detection limits. "
+        "Default: tell the open causes apart."
     ),
 ]
 VelocityLimits = Annotated[
@@ -122,6 +123,16 @@ VelocityLimits = Annotated[
 TravelLimits = Annotated[
     list[float] | None,
     _text("Travel in rad of the motors, either way: one number for all, or one for each axis."),
+]
+AccelerationLimits = Annotated[
+    list[float] | None,
+    _text("Acceleration limit in rad/s^2 of the motors: one number for all, or one for each axis."),
+]
+Room = Annotated[
+    list[float] | None,
+    _text(
+        "Box in which the origin of the last link stays, in m in the base frame: lowest x, y, z, highest x, y, z."
+    ),
 ]
 TorqueLimits = Annotated[
     list[float] | None,
