@@ -13,6 +13,11 @@ OwnValues = list[tuple[int, int, float]]
 """Values of effect parameters that hold in one log only: effect, parameter, value."""
 
 
+def payload_of(load: Load) -> Effect:
+    """Return the effect of a load that is mounted."""
+    return Effect("payload", None, load.parameters)
+
+
 def with_loads(
     robot: Robot, effects: Sequence[Effect], loads: Sequence[Load | None]
 ) -> tuple[list[Effect], list[OwnValues]]:

@@ -13,6 +13,7 @@ from axisight.effects import Effect
 from axisight.excitation import References, write_references
 from axisight.gap.facts.axis_names import placed
 from axisight.gap.facts.wording import listed
+from axisight.logs import Load
 from axisight.paths import JointTrajectory, write_joint_trajectory
 from axisight.storage import write_whole
 
@@ -185,15 +186,6 @@ class ShowingExperiment(Experiment):
 
 @summarized
 @dataclass(frozen=True, eq=False)
-class KnownLoad:
-    """A load for a run: ``mass_kg`` [kg], ``centre_m`` its centre (x, y, z) [m] in the frame of the last link."""
-
-    mass_kg: float
-    centre_m: tuple[float, float, float]
-
-
-@summarized
-@dataclass(frozen=True, eq=False)
 class RecordExperiment(Experiment):
     """A record with what a diagnosis needs if no hypothesis fits, or if its detection limits are too coarse.
 
@@ -204,7 +196,7 @@ class RecordExperiment(Experiment):
 
     slow: Plan
     loaded: Plan
-    load: KnownLoad | None
+    load: Load | None
 
     @property
     def decides(self) -> bool:

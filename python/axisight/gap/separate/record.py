@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.effects import Effect
 from axisight.fitting.divergence import must_hold
-from axisight.gap.facts.experiment import KnownLoad, Plan, RecordExperiment
+from axisight.fitting.loads import payload_of
+from axisight.gap.facts.experiment import Plan, RecordExperiment
 from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.separate.design import planned
 from axisight.gap.separate.route import Route, Runs
 from axisight.gap.separate.waves import Motion
+from axisight.logs import Load
 
 Array = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ def _smallest(tried: Sequence[Motion]) -> Motion:
     return min(tried, key=lambda m: float(np.abs(m.reference).max()))
 
 
-def _with_load(route: Route, model: FittedModel, rich: Motion) -> tuple[KnownLoad | None, Motion]:
+def _with_load(route: Route, model: FittedModel, rich: Motion) -> tuple[Load | None, Motion]:
     """Return a load that shows along the rich motion within the limits, and the motion to run with it.
 
     Its centre is that of the last link: a load on a joint's axis would not turn the joint.
@@ -98,9 +99,8 @@ def _with_load(route: Route, model: FittedModel, rich: Motion) -> tuple[KnownLoa
         bare = route.runs(model, [motion])
         size = np.abs(bare.torques[0]).max(axis=0)
         for share in _MASSES:
-            load = KnownLoad(float(f"{share * whole:.1g}"), (x, y, z))
-            place = {"x_m": x, "y_m": y, "z_m": z}
-            effect = Effect("payload", None, {"mass_kg": load.mass_kg, **place})
+            load = Load(float(f"{share * whole:.1g}"), (x, y, z))
+            effect = payload_of(load)
             others = [e for e in model.effects if e.label != effect.label]
             carrying = replace(model, effects=(*others, effect))
             runs = route.runs(carrying, [motion])

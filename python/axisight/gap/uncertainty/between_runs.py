@@ -97,7 +97,7 @@ def _tested(logs: Sequence[_OfLog], column: int, same: float) -> tuple[float, fl
     spread = float(np.sum((1 - weight / total) ** 2 / free))
     ratio = q / (count - 1) / (1 + 2 * (count - 2) / (count**2 - 1) * spread)
     freedom = (count**2 - 1) / (3 * max(spread, 1e-12))
-    p = float(scipy.stats.f.sf(ratio, count - 1, freedom))
+    p = float(scipy.special.fdtrc(count - 1, freedom, ratio))
     base = total - float((weight**2).sum()) / total
     return float(np.sqrt(max(0.0, (q - (count - 1)) / base))), p
 
