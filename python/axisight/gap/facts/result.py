@@ -346,15 +346,12 @@ class Overlay:
 class Diagnosis:
     """Everything a diagnosis found.
 
-    ``band_map``: dims (axis, band), ``regime_maps[name]``: dims (axis, bin);
-    each a Dataset with ``share`` (of that axis's squared baseline error above
-    the floor), ``excess`` (ratio of the squared error to the floor) and
+    ``band_map``: dims (axis, band), ``regime_maps[name]``: dims (axis, bin); each a Dataset with ``share`` (of the
+    axis's squared baseline error above the floor), ``excess`` (ratio of the squared error to the floor) and
     ``significance`` (in standard errors). Band and bin coordinates are labels.
-    ``detection_limits``: of each effect that is no cause.
-    ``refit``: relative change of the simulator's own parameters [1]. ``settings``: what was set, by
-    the names of `Settings`.
-    ``findings``: faults of robot file and logs that do not rule out a diagnosis, and parameters that the re-fit took to
-    the edge of their tolerance. ``experiment``, if asked for: one that separates open causes, or shows an effect.
+    ``detection_limits``: of effects that are no cause. ``settings``: what was set.
+    ``refit``: relative change of the simulator's own parameters [1]. ``findings``: faults of robot file and logs that
+    rule out no diagnosis, and re-fitted parameters at the edge of their tolerance. ``experiment``: what was asked for.
     ``simulator``: how far the model reproduces the user's own simulator, where its logs were given.
     ``signals``, if asked for: a Dataset for each log, estimation logs first, with the dims (time_s, axis)
     [Nm, N on a prismatic axis; motor side]. ``measured_torque_nm``. ``simulated_before_torque_nm`` of the
