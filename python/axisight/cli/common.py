@@ -37,6 +37,14 @@ To = Annotated[
         help="Leave out what comes after in each log. Default: its end.",
     ),
 ]
+TorqueMeasured = Annotated[
+    bool,
+    typer.Option(
+        "--torque-measured",
+        rich_help_panel=COMPARED,
+        help="The torque is a measurement, not a command that is held from sample to sample.",
+    ),
+]
 Moving = Annotated[
     bool,
     typer.Option(

@@ -13,7 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 import axisight
-from axisight.cli.common import Columns, Force, From, Moving, To, errors, say
+from axisight.cli.common import Columns, Force, From, Moving, To, TorqueMeasured, errors, say
 from axisight.cli.identify_common import (
     Out,
     Unchecked,
@@ -96,14 +96,7 @@ def rigid_body_command(
             "there (s). Default: two periods of --cutoff-hz.",
         ),
     ] = None,
-    torque_measured: Annotated[
-        bool,
-        typer.Option(
-            "--torque-measured",
-            rich_help_panel=COMPARED,
-            help="The torque is a measurement, not a command that is held from sample to sample.",
-        ),
-    ] = False,
+    torque_measured: TorqueMeasured = False,
     method: Annotated[
         str,
         typer.Option(

@@ -16,6 +16,7 @@ from axisight.cli.common import (
     From,
     Moving,
     To,
+    TorqueMeasured,
     errors,
     say,
     write_each,
@@ -85,14 +86,7 @@ def repeat_command(
             "--cutoff-hz.",
         ),
     ] = None,
-    torque_measured: Annotated[
-        bool,
-        typer.Option(
-            "--torque-measured",
-            rich_help_panel=COMPARED,
-            help="The torque is a measurement, not a command that is held from sample to sample.",
-        ),
-    ] = False,
+    torque_measured: TorqueMeasured = False,
     level: Annotated[
         float,
         typer.Option(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -66,9 +67,9 @@ class PositionRoute(Route):
         reference = np.diff(course, axis=0) / self.step_s
         return [Motion(self.usual, self.room.every, reference, course[0])]
 
+    @abstractmethod
     def _course_of(self, log: Log) -> Array:
         """Return the positions of a log without noise (n, n_axes) [rad], at the rate of motions."""
-        raise NotImplementedError
 
     def motions(self, axes: Sequence[int]) -> list[Motion]:
         """Return the motions to try on ``axes`` (from 1), each alone and all together."""
