@@ -46,21 +46,21 @@ class Model:
         at = fit(self.robot, [log], mass, effects=self.effects, options=none)
         return log.position_rad[:, 0] + np.asarray(at.core.residual)
 
-    def fitted(self, log: Log, only: str = "") -> Model:
+    def fitted(self, log: Log, family: str = "") -> Model:
         """Return the model with mass and amplitudes fitted to the positions of a log, driven by its force.
 
-        ``only``: fit the effects with this in their name, and not the mass.
+        ``family``: fit the effects of this family, and not the mass.
         """
         placed = self.robot.placed(self.effects)
         free = [
             effect_parameter(placed, i, p.name)
             for i, effect in enumerate(placed)
             for p in effect_info(effect.name).parameters
-            if only in effect.name
+            if family in ("", effect_info(effect.name).family)
             and p.role == "amplitude"
             and (effect.parameters or {}).get(p.name)
         ]
-        mass = [] if only else [robot_parameter(self.robot, MASS)]
+        mass = [] if family else [robot_parameter(self.robot, MASS)]
         options = FitOptions(max_iterations=200)
         found = fit(self.robot, [log], [*free, *mass], effects=placed, options=options)
         if not found.status.endswith("converged"):
@@ -103,10 +103,14 @@ def main() -> None:
         print(f"| {name} | {1e3 * off[0]:.2f} | {1e3 * off[1]:.2f} | {share:.1%} |")
     if given.submission:
         np.savez(given.submission, position_m=ours.position(test))
+    stretches = steady(train)
+    for log in (train, test):
+        print(f"\n{log.name}: least squares of the mean forces at constant speed\n")
+        print("\n".join(least_squares_rows(log, stretches)))
     print(
         "\n| from (s) | speed (m/s) | force, training run (N) | test run (N) |\n|---|---|---|---|"
     )
-    for start, stop, speed in steady(train):
+    for start, stop, speed in stretches:
         forces = (float(log.torque_nm[start:stop].mean()) for log in (train, test))
         print(
             f"| {train.time_s[start]:.2f} | {speed:.4f} | "
@@ -137,6 +141,27 @@ def rms_error(model: Model, log: Log) -> float:
     """Return the rms error of position [m], without the first samples."""
     error = (model.position(log) - log.position_rad[:, 0])[INITIAL:]
     return float(np.sqrt(np.mean(error**2)))
+
+
+def least_squares_rows(log: Log, stretches: Sequence[tuple[int, int, float]]) -> list[str]:
+    """Return a table of F_v v + F_c sign(v) beside an offset, D |v|, or both, fitted to mean forces (± std)."""
+    speed = np.array([v for *_, v in stretches])
+    force = np.array([log.torque_nm[start:stop].mean() for start, stop, _ in stretches])
+    common = {"F_v (N s/m)": speed, "F_c (N)": np.sign(speed)}
+    even = {"D (N s/m)": np.abs(speed), "offset (N)": np.ones(len(speed))}
+    names = [*common, *even]
+    rows = [f"| {' | '.join(names)} | rms error (N) |", "|---" * (len(names) + 1) + "|"]
+    for beside in (["offset (N)"], ["D (N s/m)"], list(even)):
+        columns = {**common, **{name: even[name] for name in beside}}
+        x = np.stack(list(columns.values()), axis=1)
+        theta = np.linalg.lstsq(x, force, rcond=None)[0]
+        error = force - x @ theta
+        scatter = error @ error / (len(force) - x.shape[1])
+        std = np.sqrt(scatter * np.diag(np.linalg.inv(x.T @ x)))
+        told = {n: f"{v:.3g} ± {s:.2g}" for n, v, s in zip(columns, theta, std, strict=True)}
+        cells = [told.get(name, "-") for name in names]
+        rows.append(f"| {' | '.join(cells)} | {np.sqrt(np.mean(error**2)):.2f} |")
+    return rows
 
 
 def steady(log: Log) -> list[tuple[int, int, float]]:

@@ -31,17 +31,26 @@ def default_data() -> Path:
     return Path(root) / "emps" if root else HERE.parents[2] / "shared" / "data" / "emps"
 
 
+# Terms of the force, by the effect and the parameter that state them. An offset that helps the motor lowers the force
+# it must be asked for.
+TERMS = {
+    "viscous": ("viscous_friction", "viscous_nm_s_rad", 1.0),
+    "coulomb": ("coulomb_friction", "coulomb_nm", 1.0),
+    "offset": ("torque_offset", "offset_nm", -1.0),
+    "asymmetry": ("viscous_asymmetry", "half_difference_nm_s_rad", 1.0),
+}
+
+
 def found_parameters(robot: axisight.Robot, found: axisight.Diagnosis) -> dict[str, float]:
-    """Return the parameters in the signs of the publication: force = M a + Fv v + Fc sign v + offset."""
+    """Return the terms that are named: force = M a + Fv v + D |v| + Fc sign v + offset, signs of the publication."""
     values = {c.effect: c.parameters for c in found.causes}
     nominal = axisight.robot_parameters(robot)["carriage.mass"]
-    return {
-        "mass": nominal * (1 + found.refit["carriage.mass"].value),
-        "viscous": values["viscous_friction"]["viscous_nm_s_rad"].value,
-        "coulomb": values["coulomb_friction"]["coulomb_nm"].value,
-        # An offset that helps the motor lowers the force it must be asked for.
-        "offset": -values["torque_offset"]["offset_nm"].value,
+    named = {
+        term: sign * values[effect][parameter].value
+        for term, (effect, parameter, sign) in TERMS.items()
+        if effect in values
     }
+    return {"mass": nominal * (1 + found.refit["carriage.mass"].value), **named}
 
 
 def story(
@@ -122,9 +131,13 @@ def main() -> int:
     found = axisight.diagnose(robot=robot, estimation=[estimation], validation=[held], name="EMPS")
     print(found.headline)
     ours = found_parameters(robot, found)
-    for name, published in PUBLISHED.items():
-        error = 100 * abs(ours[name] / published - 1)
-        print(f"{name:8s} found {ours[name]:9.4f}  published {published:9.4f}  off {error:.2f} %")
+    for name in (*PUBLISHED, *(n for n in ours if n not in PUBLISHED)):
+        value, published = ours.get(name), PUBLISHED.get(name)
+        told = "not named" if value is None else f"{value:9.4f}"
+        beside = "not published" if published is None else f"published {published:9.4f}"
+        if value is not None and published is not None:
+            beside += f"  off {100 * abs(value / published - 1):.2f} %"
+        print(f"{name:9s} found {told}  {beside}")
     arguments.out.mkdir(parents=True, exist_ok=True)
     story(robot, found, estimation, held).savefig(arguments.out / "emps.png", dpi=120)
     found.save_verdict(arguments.out / "verdict.json")

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from axisight.blind.machine import Machine
 from axisight.blind.motions import MOTIONS
 from axisight.blind.scene import Drawn, Kind, Scene
-from axisight.blind.withheld import BY_REFERENCES, KINDS
-from axisight.blind.withheld_formulas import KINDS_BY_FORMULA
+from axisight.blind.withheld import BY_REFERENCES, KINDS, KINDS_ON_REQUEST
+from axisight.blind.withheld_formulas import KINDS_BY_FORMULA, KINDS_BY_FORMULA_ON_REQUEST
 from axisight.errors import InputError
 from axisight.robot import Robot, load_robot
 
@@ -37,7 +37,12 @@ _CHANGES = (
 # One case of so many has no effect, one has two.
 _ONE_IN = {"nothing": 8, "pair": 6}
 ENGINES: Mapping[str, Mapping[str, Kind]] = {"mujoco": KINDS, "pinocchio": KINDS_BY_FORMULA}
-"""Kinds of effects by engine."""
+"""Kinds of effects by engine, from which cases draw. Another name would change every draw of every seed."""
+ON_REQUEST: Mapping[str, Mapping[str, Kind]] = {
+    "mujoco": KINDS_ON_REQUEST,
+    "pinocchio": KINDS_BY_FORMULA_ON_REQUEST,
+}
+"""Kinds of effects by engine that cases have only where a choice names them."""
 # Share of the cases by engine, arm and motions.
 _ENGINES = {"mujoco": 0.5, "pinocchio": 0.5}
 _ARMS = {"irb6600_like": 0.6, "scara_like": 0.15, "lever_like": 0.15, "cobot_like": 0.1}
@@ -54,21 +59,38 @@ _BITS = (12, 16)
 
 @dataclass(frozen=True)
 class Choice:
-    """Fixed parts of a draw: engine, arm and motions by name; None is drawn.
+    """Fixed parts of a draw: engine, arm, motions and effect by name; None is drawn.
 
-    Raises InputError for unknown names.
+    ``effect``: withheld alone in every case. Raises InputError for unknown names.
     """
 
     engine: str | None = None
     arm: str | None = None
     motions: str | None = None
+    effect: str | None = None
 
     def __post_init__(self) -> None:
         """Raise InputError for unknown names."""
-        for name, known in (("engine", _ENGINES), ("arm", _ARMS), ("motions", _MOTIONS)):
+        known: dict[str, Sequence[str]] = {
+            "engine": list(_ENGINES),
+            "arm": list(_ARMS),
+            "motions": list(_MOTIONS),
+            "effect": _effects_of(self.engine),
+        }
+        for name, names in known.items():
             value = getattr(self, name)
-            if value is not None and value not in known:
-                raise InputError(f"{name}: expected one of {', '.join(known)}, got {value!r}")
+            if value is not None and value not in names:
+                raise InputError(f"{name}: expected one of {', '.join(names)}, got {value!r}")
+
+
+def _effects_of(engine: str | None) -> list[str]:
+    """Return the names of the effects of an engine, or of those that all engines have."""
+    kinds = [_all_kinds(e) for e in ([engine] if engine in ENGINES else ENGINES)]
+    return [name for name in kinds[0] if all(name in others for others in kinds)]
+
+
+def _all_kinds(engine: str) -> dict[str, Kind]:
+    return {**ENGINES[engine], **ON_REQUEST[engine]}
 
 
 @dataclass(frozen=True)
@@ -101,13 +123,19 @@ DRAWN = Choice()
 
 
 def draw(seed: int, number: int, choice: Choice = DRAWN, attempt: int = 0) -> Draw:
-    """Return case ``number`` of a benchmark; every ``attempt`` draws another one."""
+    """Return case ``number`` of a benchmark; every ``attempt`` draws another one.
+
+    Raises InputError if the chosen effect shows on no axis of the arm.
+    """
     rng = _chance(seed, number, attempt)
     engine, arm, motions = _circumstances(rng, choice)
     robot = load_robot(arm)
     references = MOTIONS[motions](rng, robot)
     scene = Scene(robot, [reference for _, reference in references.values()])
-    effects = _effects(rng, number, scene, ENGINES[engine])
+    if choice.effect is None:
+        effects = _effects(rng, number, scene, ENGINES[engine])
+    else:
+        effects = _chosen(rng, scene, choice.effect, _all_kinds(engine))
     machine = _without_scatter_of(effects, scattered(rng, robot), robot)
     with_effects, bare = machine_of(machine, effects), machine_of(machine, ())
     corner_hz = float(rng.uniform(*_CORNER_HZ)) if rng.integers(_COLOURED_ONE_IN) == 0 else None
@@ -160,6 +188,18 @@ def _effects(
     if number % _ONE_IN["pair"] == 1 and there[first].in_library and not there[first].alone:
         out += _second(rng, scene, there, first, out[0])
     return tuple(out)
+
+
+def _chosen(
+    rng: np.random.Generator, scene: Scene, name: str, kinds: Mapping[str, Kind]
+) -> tuple[Drawn, ...]:
+    """Return one effect on an axis where it shows; raises InputError if there is none."""
+    axes = kinds[name].axes(scene)
+    if not axes:
+        raise InputError(
+            f"effect: expected one that shows on an axis of {scene.robot.name}, got {name!r}"
+        )
+    return (kinds[name].draw(rng, scene, int(rng.choice(axes))),)
 
 
 def _second(

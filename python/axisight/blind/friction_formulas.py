@@ -59,6 +59,19 @@ class UnevenArctan(Formula):
 
 
 @dataclass
+class RoundedViscousByDirection(Formula):
+    """Half the difference of viscous friction between the directions; a hyperbola rounds the corner at rest."""
+
+    half_difference_nm_s_rad: float
+    corner_rad_s: float
+
+    def torque(self, at: Place) -> tuple[Array | float, Array | float]:
+        """Return friction on the motor."""
+        size = np.hypot(at.motor_speed, self.corner_rad_s) - self.corner_rad_s
+        return -self.half_difference_nm_s_rad * size, 0.0
+
+
+@dataclass
 class BehindGear(Formula):
     """A motor's friction formula applied to the joint: it takes angle and speed of the joint."""
 

@@ -53,6 +53,19 @@ class UnevenFriction(Law):
 
 
 @dataclass
+class ViscousByDirection(Law):
+    """Viscous friction with a coefficient for each direction, beside the machine's own."""
+
+    forward_nm_s_rad: float
+    backward_nm_s_rad: float
+
+    def torque(self, at: Axis) -> tuple[float, float]:
+        """Return friction on the motor."""
+        forward = at.motor_speed > 0
+        return -(self.forward_nm_s_rad if forward else self.backward_nm_s_rad) * at.motor_speed, 0.0
+
+
+@dataclass
 class BehindGear(Law):
     """A motor's friction law applied to the joint: it takes the state of a motor on a rigid gear."""
 

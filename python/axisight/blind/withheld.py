@@ -143,6 +143,15 @@ def _asymmetric(rng: Rng, scene: Scene, axis: int) -> Drawn:
     return Drawn("asymmetric_friction", axis, values, laws=[law])
 
 
+def _viscous_by_direction(rng: Rng, scene: Scene, axis: int) -> Drawn:
+    # Less than the simulator's friction, so that friction takes power in both directions.
+    own = scene.of_joint(axis, "viscous_friction")
+    more = sign(rng) * between(rng, 0.3, 0.9) * own
+    values = {"half_difference_nm_s_rad": more}
+    law = friction_laws.ViscousByDirection(more, -more)
+    return Drawn("viscous_asymmetry", axis, values, laws=[law])
+
+
 def _drag(rng: Rng, scene: Scene, axis: int) -> Drawn:
     # About as much as the simulator's friction at the largest speed.
     share = between(rng, 0.4, 1.5) * scene.of_joint(axis, "viscous_friction")
@@ -522,6 +531,9 @@ KINDS: Mapping[str, Kind] = {
     "cubic_damper": Kind(_cubic_damper, in_library=False),
 }
 """Kinds by name of the effect."""
+
+KINDS_ON_REQUEST: Mapping[str, Kind] = {"viscous_asymmetry": Kind(_viscous_by_direction)}
+"""Kinds that cases have only where they are chosen by name."""
 
 BY_REFERENCES = frozenset(
     {

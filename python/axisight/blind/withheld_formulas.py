@@ -11,7 +11,15 @@ from axisight.blind import formulas, friction_formulas, joint_formulas
 from axisight.blind.formulas import Formula
 from axisight.blind.machine import NOTHING, Native
 from axisight.blind.scene import Drawn, Kind, Rng, Scene, between, sign, turning, unloaded
-from axisight.blind.withheld import BEHIND, KINDS, behind, on_joint, uneven, yielding
+from axisight.blind.withheld import (
+    BEHIND,
+    KINDS,
+    KINDS_ON_REQUEST,
+    behind,
+    on_joint,
+    uneven,
+    yielding,
+)
 
 DRY_STRAIN_RAD = 2e-3
 """Motor angle over which dry friction builds up after a reversal."""
@@ -22,7 +30,7 @@ Law = Callable[[Rng, Scene, int, Mapping[str, float]], Formula]
 
 def _by(name: str, law: Law) -> Kind:
     """Return a kind of `withheld` with the same sizes and axes, but another law of its parameters."""
-    kind = KINDS[name]
+    kind = {**KINDS, **KINDS_ON_REQUEST}[name]
 
     def draw(rng: Rng, scene: Scene, axis: int) -> Drawn:
         drawn = kind.draw(rng, scene, axis)
@@ -33,6 +41,12 @@ def _by(name: str, law: Law) -> Kind:
         return replace(drawn, laws=laws, native=NOTHING)
 
     return replace(kind, draw=draw)
+
+
+def _viscous_by_direction(
+    _rng: Rng, _scene: Scene, _axis: int, values: Mapping[str, float]
+) -> Formula:
+    return friction_formulas.RoundedViscousByDirection(values["half_difference_nm_s_rad"], 0.05)
 
 
 def _dahl(_rng: Rng, _scene: Scene, _axis: int, values: Mapping[str, float]) -> Formula:
@@ -251,3 +265,8 @@ KINDS_BY_FORMULA: Mapping[str, Kind] = (
     }
 )
 """Kinds by name of the effect."""
+
+KINDS_BY_FORMULA_ON_REQUEST: Mapping[str, Kind] = {
+    "viscous_asymmetry": _by("viscous_asymmetry", _viscous_by_direction)
+}
+"""Kinds that cases have only where they are chosen by name."""

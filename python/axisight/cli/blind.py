@@ -53,6 +53,10 @@ def make_command(
     motions: Annotated[
         str | None, typer.Option(help="One of the motion plans. Default: drawn at random.")
     ] = None,
+    effect: Annotated[
+        str | None,
+        typer.Option(help="Effect to withhold alone in every case. Default: drawn at random."),
+    ] = None,
 ) -> None:
     """Simulate machines that differ from their simulator, with other engines (extra `blind`)."""
     with errors(), bars() as progress:
@@ -63,7 +67,7 @@ def make_command(
         from axisight.blind.make import make_cases  # noqa: PLC0415
 
         numbers = range(first, first + count)
-        choice = Choice(engine, arm, motions)
+        choice = Choice(engine, arm, motions, effect)
         make_cases(cases, truth, numbers, seed, workers or os.cpu_count() or 1, progress, choice)
     say(f"{counted(count, 'case')}: {cases}; what is withheld: {truth}")
 

@@ -23,7 +23,15 @@ from axisight.blind import (
     pinocchio_engine,
 )
 from axisight.blind.case_files import CaseFolder
-from axisight.blind.drawing import ENGINES, Choice, circumstances, draw, machine_of, scattered
+from axisight.blind.drawing import (
+    ENGINES,
+    ON_REQUEST,
+    Choice,
+    circumstances,
+    draw,
+    machine_of,
+    scattered,
+)
 from axisight.blind.formulas import (
     ConstantTorque,
     DelayLine,
@@ -52,7 +60,8 @@ def robot() -> Robot:
 RUN = {"mujoco": mujoco_engine.run, "pinocchio": pinocchio_engine.run}
 # In which every kind of gap shows in the torque, but those that come late [s].
 LOOK_S = 0.5
-KINDS = [(engine, name) for engine, kinds in ENGINES.items() for name in kinds]
+EVERY = {engine: {**kinds, **ON_REQUEST[engine]} for engine, kinds in ENGINES.items()}
+KINDS = [(engine, name) for engine, kinds in EVERY.items() for name in kinds]
 
 
 @cache
@@ -110,7 +119,7 @@ def test_without_effects_the_other_engines_agree_with_ours(engine: str, arm: str
 @pytest.mark.parametrize(("engine", "name"), KINDS)
 def test_every_kind_changes_the_torque(engine: str, name: str, robot: Robot):
     reference = 1.5 * short(IRB, LOOK_S)
-    kind, scene = ENGINES[engine][name], Scene(robot, [reference])
+    kind, scene = EVERY[engine][name], Scene(robot, [reference])
     axes = kind.axes(scene)
     drawn = kind.draw(np.random.default_rng(5), scene, 2 if 2 in axes else axes[0])
     bare = bare_torque(engine)
@@ -293,6 +302,37 @@ def test_engines_arms_and_motions_are_drawn_unless_they_are_chosen():
     assert circumstances(2, 3, chosen) == (one.engine, "lever_like", one.motions)
     with pytest.raises(InputError, match="arm: expected one of irb6600_like, "):
         Choice(arm="nothing")
+
+
+def test_a_chosen_effect_is_withheld_alone_in_every_case():
+    cases = [draw(5, n, Choice(effect="viscous_asymmetry")) for n in range(6)]
+    assert {(e.effect, len(d.effects)) for d in cases for e in d.effects} == {
+        ("viscous_asymmetry", 1)
+    }
+    # One that every engine has, or that the chosen engine has.
+    Choice(engine="mujoco", effect="cubic_damper")
+    for engine in (None, "pinocchio"):
+        with pytest.raises(InputError, match="effect: expected one of coulomb_friction, "):
+            Choice(engine=engine, effect="cubic_damper")
+    # A lever hangs on its only axis, and a deadband shows without weight only.
+    with pytest.raises(InputError, match="effect: expected one that shows on an axis of"):
+        draw(5, 0, Choice(arm="lever_like", effect="torque_deadband"))
+
+
+def test_seeds_keep_their_draws():
+    """Cases of published benchmarks can be made again; another name in `ENGINES` would change all of them."""
+    drawn = {n: draw(189, n) for n in (2, 10, 13, 18, 19)}
+    assert {
+        n: (d.engine, d.arm, *(f"{e.effect}@{e.axis}" for e in d.effects)) for n, d in drawn.items()
+    } == {
+        2: ("mujoco", "irb6600_like", "outside_tone@3"),
+        10: ("mujoco", "irb6600_like", "asymmetric_friction@1"),
+        13: ("mujoco", "irb6600_like", "joint_stiffness@2", "resolver_ripple@1"),
+        18: ("mujoco", "scara_like", "presliding_friction@2"),
+        19: ("pinocchio", "irb6600_like", "coulomb_friction@3", "link_com@1"),
+    }
+    (uneven,) = drawn[10].effects
+    assert uneven.parameters["forward_nm"] == pytest.approx(0.250308, abs=1e-6)
 
 
 def at(motor_speed: float = 0.0, deflection: float = 0.0) -> Axis:

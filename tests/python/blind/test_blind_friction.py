@@ -69,6 +69,21 @@ def test_friction_is_uneven_over_the_joint():
             assert (motor, joint) == (0.0, pytest.approx(-np.sign(speed) * size, rel=1e-5))
 
 
+@pytest.mark.parametrize("speed", [-40.0, -0.02, 0.0, 0.3, 25.0])
+def test_viscous_friction_by_direction_is_that_of_the_table_beyond_its_corner(speed: float):
+    """Corners of 0.05 rad/s: both laws leave out at most 0.05 D of the torque D |w|, the table less."""
+    half = -0.004
+    law = friction_laws.ViscousByDirection(half, -half)
+    formula = friction_formulas.RoundedViscousByDirection(half, 0.05)
+    one = np.ones(1)
+    place = Place(0.0, 3.0 * one, speed * one, *[np.zeros(1)] * 2, 0.01, 1.0, 0.0)
+    motor = law.torque(Axis(0.0, 3.0, speed, 0.03, 0.01 * speed, 0.01, 0.0))
+    assert motor == (pytest.approx(-half * abs(speed), abs=1e-15), 0.0)
+    rounded, joint = formula.torque(place)
+    assert np.abs(np.asarray(rounded) + half * abs(speed)).max() <= 0.05 * abs(half)
+    assert joint == 0.0
+
+
 def test_behind_the_gear_friction_follows_the_joint():
     """The motor may stand or run on: the joint has the friction, `1 / r` times as large as a motor would."""
     ratio, speed, dry = 0.01, -0.3, (0.7, 0.4)

@@ -84,6 +84,7 @@ def test_scatter_alone_is_none():
         Effect("controller_gain", 1, {"relative_proportional": 0.3, "relative_integral": -0.2}),
         Effect("velocity_filter", 1, {"time_constant_s": 3e-3}),
         Effect("torque_sensor_gain", 1, {"relative_error": 0.08}),
+        Effect("viscous_asymmetry", 1, {"half_difference_nm_s_rad": 0.006}),
     ],
     ids=lambda e: f"{e.name}-{next(iter(e.parameters))}",
 )

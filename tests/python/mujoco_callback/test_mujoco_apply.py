@@ -28,6 +28,10 @@ LAWS = {
         lambda a, w, u, g: -(0.05 + 0.03 * np.exp(-((w / 5) ** 2))) * np.tanh(w / 0.5),
     ),
     "quadratic_drag": ({"drag_nm_s2_rad2": 2e-4}, lambda a, w, u, g: -2e-4 * w * np.abs(w)),
+    "viscous_asymmetry": (
+        {"half_difference_nm_s_rad": 0.002, **SIGN},
+        lambda a, w, u, g: -0.002 * w * np.tanh(w / 0.5),
+    ),
     "load_dependent_friction": (
         {"coefficient": 0.1, **SIGN},
         lambda a, w, u, g: -0.1 * np.abs(g) * np.tanh(w / 0.5),

@@ -139,6 +139,7 @@ effect_table!(
     clock_drift,
     position_quantization,
     rotor_inertia,
+    viscous_asymmetry,
 );
 
 /// Description of effect `name`.

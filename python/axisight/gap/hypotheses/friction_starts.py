@@ -50,6 +50,16 @@ def dry_law(**shares: float) -> Callable[[StartContext], Hypothesis]:
     return start
 
 
+def by_direction(trial: StartContext) -> Hypothesis:
+    """Start without a difference between the directions; the corner at zero speed is sharp and stays.
+
+    Near zero speed this friction vanishes, so logs do not show its corner.
+    """
+    begin = dry_law(smoothing_rad_s=SMOOTHING)(trial)
+    free = tuple(p.name for p in trial.info.parameters if p.role == "amplitude")
+    return replace(begin, free=free, bounds={})
+
+
 def stribeck(trial: StartContext) -> Hypothesis:
     """Start as a friction law with several Stribeck speeds; a fit does not move over decades of speed."""
     name = "stribeck_speed_rad_s"

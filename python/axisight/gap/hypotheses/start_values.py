@@ -17,6 +17,7 @@ from axisight.gap.fit.fitted_model import Hypothesis
 from axisight.gap.hypotheses.friction_starts import (
     SMOOTHING,
     TURNS_SLOWLY,
+    by_direction,
     dry_law,
     presliding,
     stribeck,
@@ -551,6 +552,7 @@ STARTS: Mapping[str, Callable[[StartContext], Hypothesis | None]] = {
     "clock_drift": _shown_by_logs,
     "position_quantization": _shown_by_logs,
     "rotor_inertia": _neutral,
+    "viscous_asymmetry": by_direction,
 }
 """Start of each effect, by its name."""
 

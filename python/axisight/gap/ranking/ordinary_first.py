@@ -21,12 +21,13 @@ def ordinary_first(
 ) -> AxisPosterior:
     """Return the posterior without the leaders that give way to what every machine has and the simulator lacks.
 
-    Effects of the arm give way, and so does another friction of the axis, which may still be added later. Unchanged in
-    closed loop, and where nothing that the axis lacks is a cause. Other effects of the axis may lead.
+    Effects of the arm give way, and so does another friction of the axis, which may still be added later. A composite
+    gives way to its own part: its other part is judged beside what every machine has. Unchanged in closed loop, and
+    where nothing that the axis lacks is a cause. Other effects of the axis may lead.
     """
     if not fitter.adds_up:
         return standing
-    lacked = (r for r in standing.ranked if is_lacked(r, standing.axis, fitter) and is_cause(r))
+    lacked = (r for r in standing.ranked if _comes_first(r, standing.axis, fitter) and is_cause(r))
     first = next(lacked, None)
     if first is None or not _gives_way(standing.best, first, standing.axis, fitter):
         return standing
@@ -42,7 +43,13 @@ def _gives_way(
     if info.acts in ("arm", "base"):
         return True
     same = info.family == effect_info(ordinary.trial.hypothesis.effect.name).family
-    return same and not is_lacked(one, axis, fitter)
+    return same and not _comes_first(one, axis, fitter)
+
+
+def _comes_first(one: RankedHypothesis, axis: int, fitter: ModelFitter) -> bool:
+    """Whether every machine has an effect itself on an axis (from 0), and the simulator states none of it."""
+    effect = one.trial.hypothesis.effect
+    return on_every_machine(effect.name) and is_lacked(one, axis, fitter)
 
 
 def is_lacked(one: RankedHypothesis, axis: int, fitter: ModelFitter) -> bool:

@@ -50,11 +50,16 @@ def test_an_arm_gives_way_to_what_its_axis_lacks():
 
 
 def test_a_rarer_friction_gives_way_too():
-    """It may be added beside the ordinary one; a composite of which that is a part does not give way."""
+    """It may be added beside the ordinary one, as may the other part of a composite."""
     before = standing(4, "quadratic_drag@4", "asymmetric_friction@4", "viscous_friction@4")
     after = ordinary_first(before, fitter(BARE), lambda _: True)
-    labels = [r.trial.label for r in after.ranked]
-    assert labels == ["asymmetric_friction@4", "viscous_friction@4"]
+    assert [r.trial.label for r in after.ranked] == ["viscous_friction@4"]
+
+
+def test_a_composite_whose_ordinary_part_is_found_displaces_no_other_friction():
+    """Beside dry and viscous friction an offset is as good a cause as another friction, not a better one."""
+    before = standing(4, "viscous_asymmetry@4", "asymmetric_friction@4", "torque_offset@4")
+    assert ordinary_first(before, fitter(BARE), lambda _: True) is before
 
 
 @pytest.mark.parametrize(
