@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from axisight.effects.stated import LAG, TORQUE_CONSTANT, TORQUE_LIMIT, TRANSPORT_DELAY
-from axisight.robot_import.mjcf_actuators import is_gain
+from axisight.effects.stated import LAG, OFFSET, TORQUE_CONSTANT, TORQUE_LIMIT, TRANSPORT_DELAY
+from axisight.robot_import.mjcf.actuators import is_gain
 from axisight.robot_import.xml_tree import Element
 from axisight.write_back.limits import LIMIT_EFFECTS, Limits
 from axisight.write_back.placed import Placed, said
@@ -36,6 +36,11 @@ def _gain(value: float, _step_s: float) -> Mapping[str, Numbers]:
     return {"gainprm": 1 + value}
 
 
+def _biased(value: float) -> Mapping[str, Numbers]:
+    """Return the attributes of an actuator with a constant torque ``value`` [Nm]."""
+    return {"biastype": "affine", "biasprm": (value, 0.0, 0.0)}
+
+
 def _lag(value: float, _step_s: float) -> Mapping[str, Numbers]:
     return {"dyntype": "filterexact", "dynprm": value}
 
@@ -45,8 +50,8 @@ _ATTRIBUTES: Mapping[str, tuple[str, Callable[[float, float], Mapping[str, Numbe
     LAG[0]: (LAG[1], _lag),
     TRANSPORT_DELAY[0]: (TRANSPORT_DELAY[1], delayed),
 }
-# Apart from `_ATTRIBUTES`, because a limit must be converted to the side before the file's gear.
-_OF_MOTORS = frozenset((*_ATTRIBUTES, TORQUE_LIMIT[0]))
+# Apart from `_ATTRIBUTES`, because they must be converted to the side before the file's gear.
+_OF_MOTORS = frozenset((*_ATTRIBUTES, TORQUE_LIMIT[0], OFFSET[0]))
 DRIVE_EFFECTS = _OF_MOTORS.union(SERVO_EFFECTS)
 
 
@@ -73,6 +78,10 @@ def write_drive(
     if beyond and (why := _cannot_limit(limits, joint[1])):
         placed.refuse(beyond, why)
         causes = [cause for cause in causes if cause not in beyond]
+    constant = [cause for cause in causes if cause.effect == OFFSET[0]]
+    if constant and any(x != math.inf for x in limits.drive.force_limits):
+        placed.refuse(constant, "the file limits the force of the motor, which would include it")
+        causes = [cause for cause in causes if cause not in constant]
     defaults = any(e.tag in ("default", "include") for e in root.walk())
     if len(mine) == 1 and is_servo(mine[0], limits):
         servo = Servo(mine[0], joint[1], limits, _has_ratio_defaults(root))
@@ -92,6 +101,8 @@ def write_drive(
     for cause in causes:
         if cause.effect == TORQUE_LIMIT[0]:
             made |= _limit(limits.of_actuator(cause.parameters[TORQUE_LIMIT[1]].value))
+        elif cause.effect == OFFSET[0]:
+            made |= _biased(limits.signed(cause.parameters[OFFSET[1]].value))
         else:
             name, attributes = _ATTRIBUTES[cause.effect]
             made |= attributes(cause.parameters[name].value, _step_s(root))
@@ -100,7 +111,7 @@ def write_drive(
     if of_joint and joint[1] is not None:
         edits.set(joint[1], of_joint, said([c for c in causes if c.effect in LIMIT_EFFECTS]))
     kind = ""
-    if made.keys() & {"gainprm", "dyntype"}:
+    if made.keys() & {"gainprm", "dyntype", "biasprm"}:
         kind = "general"
         usual = {"gainprm": "1", **_MOTOR} if defaults and mine[0].tag == "motor" else {}
         made |= {key: value for key, value in usual.items() if key not in made}

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from axisight import storage
 from axisight.display.summary import summarized
 from axisight.effects import Effect
+from axisight.effects.dcmotor import DEVICE_EFFECTS
 from axisight.effects.stated import OTHER_GAINS
 from axisight.errors import InputError
 from axisight.mujoco.torques import acts_in_gear, is_torque
@@ -26,6 +27,7 @@ from axisight.write_back.inertials import write_bodies
 from axisight.write_back.joints import JOINT_NUMBERS, write_joint
 from axisight.write_back.limits import limits_of
 from axisight.write_back.links import LINK_EFFECTS, body_changes
+from axisight.write_back.passive import write_devices
 from axisight.write_back.placed import Labelled, Placed, doubt
 from axisight.write_back.refitted import Refitted, refitted_gains
 from axisight.write_back.xml_edits import Edits
@@ -185,10 +187,11 @@ def _on_axes(
         numbers = [cause for cause in mine if cause.effect in JOINT_NUMBERS[root.tag]]
         if numbers and name in joints:
             out.append(
-                write_joint(
-                    edits, root, joints[name], robot, axis, numbers, _of_actuators(known.get(name))
-                )
+                write_joint(edits, root, joints[name], robot, axis, numbers, known.get(name))
             )
+        devices = [cause for cause in mine if cause.effect in DEVICE_EFFECTS and is_mjcf]
+        if devices and name in known:
+            out.append(write_devices(edits, root, known[name], robot, axis, devices))
         drives = [cause for cause in mine if cause.effect in DRIVE_EFFECTS]
         refitted = [gain for gain in gains if gain.axis == axis + 1 and own_law]
         if (drives or refitted) and is_mjcf:
@@ -207,28 +210,19 @@ def _on_axes(
     return out
 
 
-# Numbers that joints and actuators can both have.
-_SHARED = ("armature", "damping")
-
-
 def _drives_of(source: _Source, found: _Found) -> tuple[dict[str, Drive], bool]:
     """Return the drives of an MJCF by joint name, and whether the controller's law is in the drive data.
 
     Empty if the findings need no drive.
     """
     causes, gains = found
-    shared = any(JOINT_NUMBERS["mujoco"].get(cause.effect) in _SHARED for cause in causes)
-    if not shared and not gains and not any(cause.effect in DRIVE_EFFECTS for cause in causes):
+    on_joints = (*JOINT_NUMBERS["mujoco"], *DRIVE_EFFECTS, *DEVICE_EFFECTS)
+    if not gains and not any(cause.effect in on_joints for cause in causes):
         return {}, False
     file, given = source
     drives = given or drive_data(file)
     _, chain = bodies_and_chain(file, drives)
     return {joint.body.joint: joint.body.drive for joint in chain.joints}, drives.controller is None
-
-
-def _of_actuators(drive: Drive | None) -> dict[str, float]:
-    """Return the part of each joint number that the actuators state."""
-    return {} if drive is None else dict(zip(_SHARED, drive.of_actuators, strict=True))
 
 
 def _on_chain(

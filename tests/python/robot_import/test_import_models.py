@@ -300,7 +300,7 @@ BEYOND = {
     "damping": (
         'damping="0.7"',
         'damping="0.7 0 2"',
-        "joint 'shoulder': damping beyond the linear left out",
+        "joint 'shoulder': cubic damping left out",
     ),
     "yielding": (
         'stiffness="3"',
@@ -309,8 +309,8 @@ BEYOND = {
     ),
     "damping of a motor": (
         MOTOR,
-        '<motor name="m" joint="shoulder" damping="1 2"/>',
-        "actuator 'm': damping beyond the linear left out",
+        '<motor name="m" joint="shoulder" damping="1 0 2"/>',
+        "actuator 'm': cubic damping left out",
     ),
 }
 
@@ -369,7 +369,7 @@ def test_mujoco_is_named_where_it_is_missing(tmp_path: Path, monkeypatch: pytest
     def no(name: str):
         raise ImportError(name)
 
-    monkeypatch.setattr("axisight.robot_import.mjcf.import_module", no)
+    monkeypatch.setattr("axisight.robot_import.mjcf.reader.import_module", no)
     with pytest.raises(MissingExtraError, match=r"axisight\[mujoco\]"):
         import_robot(written(tmp_path, MJCF, "arm.xml"))
 
