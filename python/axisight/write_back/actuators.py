@@ -73,7 +73,7 @@ def write_drive(
     """
     placed, (causes, refitted) = Placed(), found
     holders = [e for e in root.walk() if e.tag == "actuator"]
-    mine = [e for h in holders for e in h.children if joint[0] in map(e.attributes.get, _JOINTS)]
+    mine = [e for h in holders for e in h.children if _drives(e, joint[0])]
     beyond = [cause for cause in causes if cause.effect in LIMIT_EFFECTS]
     if beyond and (why := _cannot_limit(limits, joint[1])):
         placed.refuse(beyond, why)
@@ -120,6 +120,12 @@ def write_drive(
     return placed
 
 
+def _drives(element: Element, joint: str) -> bool:
+    """Return whether an actuator acts on a joint and has a command."""
+    acts = joint in map(element.attributes.get, _JOINTS)
+    return acts and element.attributes.get("input") != "none"
+
+
 def _cannot_limit(limits: Limits, joint: Element | None) -> str:
     """Return why a limit cannot be written; empty if it can."""
     if not limits.alike:
@@ -149,6 +155,10 @@ def _is_motor(element: Element, defaults: bool) -> bool:
     if element.tag == "motor":
         return True
     said_so = {key: element.attributes.get(key) for key in _MOTOR}
+    # A bias that is constant is a torque beside the command.
+    if element.attributes.get("biastype") == "affine":
+        further = element.attributes.get("biasprm", "0").split()[1:]
+        said_so["biastype"] = "affine" if any(map(float, further)) else _MOTOR["biastype"]
     usual = all(value in (None, _MOTOR[key], *_LAGS.get(key, ())) for key, value in said_so.items())
     sure = not defaults or None not in said_so.values()
     gain = element.attributes.get("gainprm", "1").split()

@@ -250,7 +250,8 @@ class Actuators:
         """
         own = self.acts_on == j
         squared, damping = self.gear[own] ** 2, self.damping[own] + self.braking[own]
-        drag = self.drag[own] @ np.abs(self.gear[own]) ** 3
+        # MuJoCo multiplies all coefficients of damping by the squared gear, and takes the speed of the joint.
+        drag = self.drag[own] @ squared
         return float(self.armature[own] @ squared), float(damping @ squared), float(drag)
 
 
