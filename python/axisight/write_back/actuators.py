@@ -12,7 +12,16 @@ from axisight.robot_import.xml_tree import Element
 from axisight.write_back.limits import LIMIT_EFFECTS, Limits
 from axisight.write_back.placed import Placed, said
 from axisight.write_back.refitted import Refitted
-from axisight.write_back.servos import SERVO, SERVO_EFFECTS, Servo, delayed, is_servo, write_servo
+from axisight.write_back.servos import (
+    DELAYS_SINCE,
+    SERVO,
+    SERVO_EFFECTS,
+    Servo,
+    delayed,
+    is_servo,
+    write_servo,
+)
+from axisight.write_back.versions import too_old
 from axisight.write_back.xml_edits import Edits, Numbers
 
 if TYPE_CHECKING:
@@ -82,10 +91,14 @@ def write_drive(
     if constant and any(x != math.inf for x in limits.drive.force_limits):
         placed.refuse(constant, "the file limits the force of the motor, which would include it")
         causes = [cause for cause in causes if cause not in constant]
+    late = [cause for cause in causes if cause.effect == TRANSPORT_DELAY[0]]
+    if late and (why := too_old(DELAYS_SINCE, "delays of actuators")):
+        placed.refuse(late, why)
+        causes = [cause for cause in causes if cause not in late]
     defaults = any(e.tag in ("default", "include") for e in root.walk())
     if len(mine) == 1 and is_servo(mine[0], limits):
         servo = Servo(mine[0], joint[1], limits, _has_ratio_defaults(root))
-        return placed.joined(write_servo(edits, servo, causes, refitted, _step_s(root)))
+        return placed.joined(write_servo(edits, servo, causes, refitted, step_of(root)))
     placed.refuse(refitted, f"expected a <{SERVO}> of the joint, whose gains the file says")
     stated = [cause for cause in causes if cause.effect not in _OF_MOTORS]
     placed.refuse(stated, f"expected a <{SERVO}> of the joint, whose gains the file says")
@@ -105,7 +118,7 @@ def write_drive(
             made |= _biased(limits.signed(cause.parameters[OFFSET[1]].value))
         else:
             name, attributes = _ATTRIBUTES[cause.effect]
-            made |= attributes(cause.parameters[name].value, _step_s(root))
+            made |= attributes(cause.parameters[name].value, step_of(root))
     behind, of_joint = limits.set_by(causes, servo=False)
     made |= behind
     if of_joint and joint[1] is not None:
@@ -135,7 +148,7 @@ def _cannot_limit(limits: Limits, joint: Element | None) -> str:
     return ""
 
 
-def _step_s(root: Element) -> float:
+def step_of(root: Element) -> float:
     """Return the time step of a model [s]."""
     steps = [e.attributes["timestep"] for e in root.all("option") if "timestep" in e.attributes]
     return float(steps[-1]) if steps else _STEP_S

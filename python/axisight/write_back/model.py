@@ -21,7 +21,7 @@ from axisight.robot_import.bodies import Drive
 from axisight.robot_import.drives import DriveData
 from axisight.robot_import.load import bodies_and_chain, drive_data
 from axisight.robot_import.xml_tree import Element, parse_xml
-from axisight.write_back.actuators import DRIVE_EFFECTS, write_drive
+from axisight.write_back.actuators import DRIVE_EFFECTS, step_of, write_drive
 from axisight.write_back.frames import FRAME_EFFECTS, write_frames
 from axisight.write_back.inertials import write_bodies
 from axisight.write_back.joints import JOINT_NUMBERS, write_joint
@@ -29,6 +29,7 @@ from axisight.write_back.limits import limits_of
 from axisight.write_back.links import LINK_EFFECTS, body_changes
 from axisight.write_back.passive import write_devices
 from axisight.write_back.placed import Labelled, Placed, doubt
+from axisight.write_back.readings import READING_EFFECTS, write_readings
 from axisight.write_back.refitted import Refitted, refitted_gains
 from axisight.write_back.xml_edits import Edits
 
@@ -192,6 +193,9 @@ def _on_axes(
         devices = [cause for cause in mine if cause.effect in DEVICE_EFFECTS and is_mjcf]
         if devices and name in known:
             out.append(write_devices(edits, root, known[name], robot, axis, devices))
+        late = [cause for cause in mine if cause.effect in READING_EFFECTS and is_mjcf]
+        if late and name in known:
+            out.append(write_readings(edits, root, name, known[name], late, step_of(root)))
         drives = [cause for cause in mine if cause.effect in DRIVE_EFFECTS]
         refitted = [gain for gain in gains if gain.axis == axis + 1 and own_law]
         if (drives or refitted) and is_mjcf:
@@ -216,7 +220,7 @@ def _drives_of(source: _Source, found: _Found) -> tuple[dict[str, Drive], bool]:
     Empty if the findings need no drive.
     """
     causes, gains = found
-    on_joints = (*JOINT_NUMBERS["mujoco"], *DRIVE_EFFECTS, *DEVICE_EFFECTS)
+    on_joints = (*JOINT_NUMBERS["mujoco"], *DRIVE_EFFECTS, *DEVICE_EFFECTS, *READING_EFFECTS)
     if not gains and not any(cause.effect in on_joints for cause in causes):
         return {}, False
     file, given = source

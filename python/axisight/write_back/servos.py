@@ -69,6 +69,10 @@ def is_servo(element: Element, limits: Limits) -> bool:
     return element.tag in _TAGS or of_law
 
 
+DELAYS_SINCE = (3, 5)
+"""First version of MuJoCo with delays of actuators and sensors."""
+
+
 def delayed(value: float, step_s: float) -> Mapping[str, Numbers]:
     """Return the attributes of an actuator with a delay ``value`` [s]; ``step_s`` [s]: of the model."""
     # One buffered command per step within the delay, and one more to interpolate within a step.
