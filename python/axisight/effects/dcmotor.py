@@ -20,9 +20,12 @@ from axisight.effects.stated import (
 )
 from axisight.effects.table import effect_info
 
-# Time [s] in which the bristles of a friction without bristles deflect at the speed of its corner. Shorter ones
-# are stiffer than a step of a millisecond can follow.
+# Time [s] in which the bristles of a friction without bristles deflect at the speed of its corner.
 _DEFLECTED_S = 0.01
+# MuJoCo integrates bristles by explicit Euler. Their vibration with frequency w and damping ratio d stays bounded
+# for w h < 2 d, with step h: so their damping takes at least this many steps, and w h is at most this.
+_DAMPED_STEPS = 2.0
+_FASTEST = 0.5
 # Relative difference up to which an order is one a turn of the joint.
 _ALIKE = 1e-9
 
@@ -63,12 +66,15 @@ DEVICE_EFFECTS = frozenset((COGGING, BALANCE[0], BRISTLES[0], FALLING_FRICTION[0
 """Effects that `devices_of` takes."""
 
 
-def devices_of(effect: Effect, gear_ratio: float) -> list[Device] | str:
+def devices_of(
+    effect: Effect, gear_ratio: float, *, step_s: float, inertia_kg_m2: float
+) -> list[Device] | str:
     """Return the cogging or bristles of an effect on one axis, or why a ``dcmotor`` has none.
 
-    ``gear_ratio``: joint angle per motor angle. Bristles have no relaxation time, which only fits need. A
-    friction without bristles gets stiff ones: in slip its torque is the same, below the corner the bristles
-    hold where the law creeps.
+    ``gear_ratio``: joint angle per motor angle. ``step_s``: time step of the simulator [s]; ``inertia_kg_m2``:
+    what the motor accelerates, motor side. Both limit stiffness and damping of bristles to what MuJoCo can
+    integrate. Bristles have no relaxation time, which only fits need. A friction without bristles gets stiff
+    ones: in slip its torque is the same, below the corner the bristles hold where the law creeps.
     """
     info = effect_info(effect.name)
     value = dict(zip((p.name for p in info.parameters), effect.values(), strict=True))
@@ -85,11 +91,13 @@ def devices_of(effect: Effect, gear_ratio: float) -> list[Device] | str:
         return [_wave(gear, order, a, b) for order, a, b in waves if a or b]
     if effect.name == BRISTLES[0]:
         coulomb, ratio, speed, time_s = (value[name] for name in BRISTLE_SHAPE)
-        stiffness = coulomb / value[BRISTLES[1]]
-        return [Bristles(gear, stiffness, stiffness * time_s, coulomb, ratio * coulomb, speed)]
-    coulomb, excess, speed, corner = (value[name] for name in FALLING_FRICTION[1:])
-    stiffness = (coulomb + excess) / (corner * _DEFLECTED_S)
-    return [Bristles(gear, stiffness, 0.0, coulomb, coulomb + excess, speed)]
+        static, deflected_rad = ratio * coulomb, value[BRISTLES[1]]
+    else:
+        coulomb, excess, speed, corner = (value[name] for name in FALLING_FRICTION[1:])
+        static, deflected_rad, time_s = coulomb + excess, corner * _DEFLECTED_S, 0.0
+    stiffness = min(coulomb / deflected_rad, inertia_kg_m2 * (_FASTEST / step_s) ** 2)
+    damping = stiffness * max(time_s, _DAMPED_STEPS * step_s)
+    return [Bristles(gear, stiffness, damping, coulomb, static, speed)]
 
 
 def effects_of(

@@ -75,7 +75,8 @@ _HOMES: Mapping[str, Home] = MappingProxyType(
         BRISTLES[0]: Home(
             f"`lugre` of a {_PASSIVE}",
             PASSIVE_SINCE,
-            "without the relaxation time, which only fits need",
+            "equal, if the time step can follow the bristles; else these are softer and damped. Without the "
+            "relaxation time, which only fits need",
         ),
         FALLING_FRICTION[0]: Home(
             f"`lugre` of a {_PASSIVE}, with stiff bristles",

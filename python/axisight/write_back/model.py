@@ -192,22 +192,23 @@ def _on_axes(
             )
         devices = [cause for cause in mine if cause.effect in DEVICE_EFFECTS and is_mjcf]
         if devices and name in known:
-            out.append(write_devices(edits, root, known[name], robot, axis, devices))
+            drive, step_s = known[name], step_of(root)
+            out.append(write_devices(edits, root, drive, robot, axis, devices, step_s))
         late = [cause for cause in mine if cause.effect in READING_EFFECTS and is_mjcf]
         if late and name in known:
             out.append(write_readings(edits, root, name, known[name], late, step_of(root)))
         drives = [cause for cause in mine if cause.effect in DRIVE_EFFECTS]
         refitted = [gain for gain in gains if gain.axis == axis + 1 and own_law]
         if (drives or refitted) and is_mjcf:
-            placed, drive = Placed(), known.get(name)
+            placed = Placed()
             if not own_law:
                 gained = [cause for cause in drives if cause.effect == OTHER_GAINS[0]]
                 placed.refuse(gained, _NO_LAW)
                 drives = [cause for cause in drives if cause not in gained]
-            if drive is None:
+            if name not in known:
                 placed.refuse([*drives, *refitted], _NO_JOINT)
             else:
-                limits, joint = limits_of(drive, robot, axis), (name, joints.get(name))
+                limits, joint = limits_of(known[name], robot, axis), (name, joints.get(name))
                 made = write_drive(edits, root, joint, (drives, refitted), limits)
                 placed = placed.joined(made)
             out.append(placed)

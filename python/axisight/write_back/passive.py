@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from axisight.effects.dcmotor import Cogging, Device, devices_of
 from axisight.robot import Robot
 from axisight.robot_import.bodies import Drive
+from axisight.robot_import.load import felt_inertia
 from axisight.robot_import.xml_tree import Element
 from axisight.write_back.placed import Placed, said
 from axisight.write_back.versions import too_old
@@ -43,18 +44,24 @@ def write_devices(
     robot: Robot,
     axis: int,
     causes: Sequence[Cause],
+    step_s: float,
 ) -> Placed:
     """Write causes of one axis (from 0) as passive actuators of its joint, behind all other actuators.
 
     They have no command, so the commands of the other actuators keep their places. ``drive`` is that of the
-    file.
+    file, ``step_s`` its time step [s].
     """
     placed, name = Placed(), robot.axis_names[axis]
     stated = {effect.label for effect in robot.effects}
     defaults = any(e.tag in ("default", "include") for e in root.walk())
     children: list[tuple[str, Mapping[str, Numbers]]] = []
     for cause in causes:
-        found = devices_of(cause.as_effect(), float(robot.gear_ratio[axis]))
+        found = devices_of(
+            cause.as_effect(),
+            float(robot.gear_ratio[axis]),
+            step_s=step_s,
+            inertia_kg_m2=float(felt_inertia(robot)[axis]),
+        )
         if why := too_old(SINCE, f"<{TAG}> without input"):
             placed.refuse([cause], why)
         elif cause.label in stated:

@@ -141,6 +141,25 @@ def test_friction_that_falls_slips_with_the_same_torque(tmp_path: Path):
         assert data.qfrc_actuator[0] == pytest.approx(wanted, rel=0.006)
 
 
+@pytest.mark.parametrize("step_s", [0.0005, 0.002])
+def test_written_friction_holds_the_joint(tmp_path: Path, step_s: float):
+    """Half the level that breaks away does not move it: no chatter at the model's own time step."""
+    text = changed(ARM, 'timestep="0.0005"', f'timestep="{step_s}" gravity="0 0 0"')
+    source = written(tmp_path, text, "arm.xml")
+    for name, values in {
+        "stribeck_friction": {"coulomb_nm": 0.06, "excess_nm": 0.08, "smoothing_rad_s": 0.1},
+        "presliding_friction": {"coulomb_nm": 0.14, "presliding_rad": 1e-4},
+    }.items():
+        found = several(name, 1, **values)
+        made = write_model(source, load_robot(source), [found], tmp_path / f"{name}.xml")
+        model = mujoco.MjModel.from_xml_path(str(made.path))
+        data = mujoco.MjData(model)
+        data.ctrl[0], data.qvel[0] = 0.07, 0.2
+        mujoco.mj_step(model, data, round(2.0 / step_s))
+        assert data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number == 0
+        assert abs(data.qvel[0]) < 1e-6
+
+
 def test_what_no_passive_actuator_can_do_is_said(tmp_path: Path):
     limited = changed(ARM, 'armature="0.2"', 'armature="0.2" actuatorfrcrange="-90 90"')
     source = written(tmp_path, limited, "arm.xml")
