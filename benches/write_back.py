@@ -293,7 +293,7 @@ def row(name: str, folder: Path) -> tuple[list[str], str]:
     out = outcome(MACHINES[name], folder)
     gap = out.found.gap
     gaps = [
-        f"{100 * before:.1f} → {100 * after:.1f} %"
+        f"{100 * before:.1f} → " + ("–" if np.isnan(after) else f"{100 * after:.1f} %")
         for before, after in ((gap.before, gap.after), out.inverse, out.run)
     ]
     written = [", ".join(x) or "–" for x in (out.made.placed, out.made.left_out)]

@@ -40,6 +40,10 @@ def beside(joint: str, gear: float, torque: str) -> str:
 Machine = write_back.Machine
 WITH_TORQUE: Mapping[str, Machine] = {
     "cogging": Machine("torque_ripple@1", LAST, beside("turn", 100, 'cogging="0.12 6 0.4"')),
+    # By inverse dynamics bristles always slip, so the diagnosis names dry friction.
+    "bristles": Machine(
+        "presliding_friction@2", LAST, beside("shoulder", 120, 'lugre="0.5 0.001 0.2 0.2 3"')
+    ),
     "falling friction": Machine(
         "stribeck_friction@3", LAST, beside("elbow", 80, 'lugre="14 0.02 0.06 0.14 6"')
     ),
@@ -84,7 +88,6 @@ class OwnController(ServoArm):
 
 PID, DCMOTOR = OwnController(), OwnController(tag="dcmotor")
 OTHER = {"kp": (2700.0, 1260.0, 950.0), "kd": (96.0, 176.0, 15.0)}
-BRISTLES = f'<dcmotor joint="j2" gear="1" {PASSIVE} lugre="800 2 3 3 1"/>'
 COGGING = f'<dcmotor joint="j2" gear="1" {PASSIVE} cogging="6 9 0.3"/>'
 # The machine, and whether gains have a wide tolerance.
 WITH_TARGETS: Mapping[str, tuple[OwnController, bool]] = {
@@ -93,8 +96,6 @@ WITH_TARGETS: Mapping[str, tuple[OwnController, bool]] = {
     "weak motor of dcmotor": (DCMOTOR.weaker(2, 0.85), False),
     "limit of dcmotor": (DCMOTOR.with_changed("limit", 2, 45.0), False),
     "dry friction of pid": (PID.with_changed("dry_friction", 2, 2.5), False),
-    # By inverse dynamics, bristles always slip: only logs of targets show them.
-    "bristles beside pid": (replace(PID, beside=BRISTLES), False),
     "cogging beside pid": (replace(PID, beside=COGGING), False),
 }
 CASES = (*WITH_TORQUE, *WITH_TARGETS)
