@@ -183,6 +183,7 @@ class Tree:
 
     ``notes`` lists what a chain cannot state. ``steps`` are the time steps of the simulator of the file, None
     if they have no visible effect. ``gravity_m_s2`` (3,) [m/s^2] is None if the file states none.
+    ``gravity_share``: share of it that acts. ``holds_weight``: actuators compensate the weight.
     """
 
     name: str
@@ -191,6 +192,8 @@ class Tree:
     gravity_m_s2: Array | None = None
     notes: list[str] = field(default_factory=list)
     steps: Steps | None = None
+    gravity_share: float = 1.0
+    holds_weight: bool = False
 
     def children(self, name: str) -> list[Body]:
         """Return the bodies whose parent is ``name``."""

@@ -35,7 +35,8 @@ class Chain:
     """A serial chain from a model file, with notes on how it was made.
 
     ``end`` is the pose of the last link's frame in the file, in the frame of the last joint. ``steps`` are
-    the time steps of the simulator of the file.
+    the time steps of the simulator of the file. ``gravity_m_s2`` (3,) is the share ``gravity_share`` of the
+    file's. ``holds_weight``: actuators compensate the weight.
     """
 
     name: str
@@ -44,6 +45,8 @@ class Chain:
     gravity_m_s2: Array
     notes: tuple[str, ...]
     steps: Steps | None = None
+    gravity_share: float = 1.0
+    holds_weight: bool = False
 
 
 STANDARD_GRAVITY_M_S2 = 9.81
@@ -80,7 +83,16 @@ def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Cha
     gravity = tree.gravity_m_s2
     if gravity is None:
         gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
-    return Chain(tree.name, tuple(joints), end, gravity, (*tree.notes, *notes), tree.steps)
+    return Chain(
+        tree.name,
+        tuple(joints),
+        end,
+        gravity * tree.gravity_share,
+        (*tree.notes, *notes),
+        tree.steps,
+        tree.gravity_share,
+        tree.holds_weight,
+    )
 
 
 def _listed(names: Sequence[str] | dict[str, Body]) -> str:

@@ -119,6 +119,8 @@ def controller_of(chain: Chain, drives: DriveData) -> dict[str, Any] | None:
         "velocity_feedforward": False,
         "continuous": True,
     }
+    if chain.holds_weight:
+        out["gravity_compensation"] = True
     if chain.steps is not None:
         added = [
             chain.steps.added_inertia(kd, drive.damping * drive.gear_ratio**2) * other

@@ -9,6 +9,7 @@ import numpy as np
 
 from axisight.effects.dcmotor import effects_of
 from axisight.robot_import.mjcf.actuators import Actuators, numbers
+from axisight.robot_import.mjcf.gravity import compensation
 from axisight.robot_import.mjcf.motors import Law
 from axisight.robot_import.mjcf.sensors import notes_of_sensors, reading_delay_s
 
@@ -165,7 +166,7 @@ def _of_joints(actuators: Actuators, name: Named) -> list[str]:
             "stiffness beyond the linear": np.any(springs[j]),
             "cubic damping": dampers[model.jnt_dofadr[j], 1] != 0,
             "yielding of its spring": yields[j] > 0,
-            "actuatorgravcomp": model.jnt_actgravcomp[j] and np.any(model.body_gravcomp),
+            "actuatorgravcomp": model.jnt_actgravcomp[j] and compensation(model) is None,
         }
         # Ratios do not matter for what no effect can state.
         what |= dict.fromkeys(effects_of(actuators.devices(j), 1, 1.0)[1], True)
@@ -183,9 +184,10 @@ def _of_joints(actuators: Actuators, name: Named) -> list[str]:
 
 def _of_bodies(model: Any, name: Named) -> list[str]:
     """Return notes on what is left out of bodies."""
+    alike = compensation(model)
+    if alike is not None:
+        return alike.notes()
     held = np.flatnonzero(model.body_gravcomp).tolist()
-    if not held:
-        return []
     return [
         f"gravcomp of {_listed(name, 'body', held)} left out: gravity acts on all of their masses, what "
         f"compensates it is to be said in the controller"

@@ -24,6 +24,7 @@ from axisight.robot_import.bodies import (
     still,
 )
 from axisight.robot_import.mjcf.actuators import Actuators, numbers
+from axisight.robot_import.mjcf.gravity import Compensation, compensation
 from axisight.robot_import.mjcf.notes import notes_of
 from axisight.robot_import.mjcf.sensors import reading_delay_s
 from axisight.robot_import.outside import with_includes
@@ -118,15 +119,17 @@ class _Compiled:
             bodies[names[i]] = Body(
                 names[i], parent, "", "fixed", pose, np.zeros(3), self._mass(i), where
             )
-        tree = Tree(
+        weight = compensation(model) or Compensation()
+        return Tree(
             self._model_name(),
             bodies,
             str(self.path),
             np.array(model.opt.gravity),
             notes_of(model, self._name),
             self._steps(),
+            weight.gravity_share,
+            weight.by_actuators,
         )
-        return tree
 
     def _steps(self) -> Steps | None:
         """Return the time steps of the integrator; None for Runge-Kutta, whose step error is negligible."""
