@@ -43,6 +43,7 @@ PROBES: Mapping[str, tuple[tuple[int, int], str, str, str]] = {
 
 # Why an effect that acts where an MJCF has numbers has none there; others follow from where they act.
 WHY = {
+    "backlash": "the gear of an MJCF joint is rigid; on request, [a joint with a range](write_back.md#backlash)",
     "asymmetric_friction": "`frictionloss` is the same both ways",
     "load_dependent_friction": "no friction of MuJoCo depends on the load of the joint",
     "position_dependent_friction": "no friction of MuJoCo depends on the angle",
@@ -121,7 +122,7 @@ def instead(info: Any) -> str:
 def render() -> str:
     """Return the whole page."""
     from axisight.effects import effect_table  # noqa: PLC0415
-    from axisight.write_back.homes import mujoco_homes  # noqa: PLC0415
+    from axisight.write_back.mjcf.homes import mujoco_homes  # noqa: PLC0415
 
     homes, table = mujoco_homes(), effect_table()
     versions = [".".join(map(str, version)) for version in VERSIONS]

@@ -199,6 +199,9 @@ TORQUE_SENSOR = ("torque_sensor_gain", "relative_error")
 PLAY = ("backlash", "damped")
 """Gear without stiffness in its middle: effect, parameter for the damping there."""
 
+HALF_PLAY = "half_width_rad"
+"""Parameter of `PLAY`: half the width of the middle, joint side."""
+
 WITH_MEMORY = frozenset(
     {
         "presliding_friction",

@@ -76,6 +76,21 @@ class Edits:
         closed = b"</" + element.tag.encode() + b">"
         self._replace(start, end, tag[:-2].rstrip() + b">" + more + self._indent(start) + closed)
 
+    def add_after(
+        self, element: Element, attributes: Mapping[str, Numbers], comment: str = ""
+    ) -> None:
+        """Insert an element with the same tag and other attributes after one, with a comment above it."""
+        start, tag = self._tag(element)
+        end = start + len(tag)
+        if not tag.endswith(b"/>"):
+            closing = self._end(element, start)
+            end = self.text.index(b">", closing) + 1
+        made = f"<{element.tag}/>".encode()
+        for name, value in attributes.items():
+            made = _with(made, name, value)
+        indent = self._indent(start)
+        self._replace(end, end, (indent + _comment(comment) if comment else b"") + indent + made)
+
     def append(
         self,
         element: Element,

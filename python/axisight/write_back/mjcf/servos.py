@@ -15,7 +15,7 @@ from axisight.effects.stated import (
     TRANSPORT_DELAY,
 )
 from axisight.robot_import.xml_tree import Element
-from axisight.write_back.limits import LIMIT_EFFECTS, Limits
+from axisight.write_back.mjcf.limits import LIMIT_EFFECTS, Limits
 from axisight.write_back.placed import Labelled, Placed, said
 from axisight.write_back.refitted import Refitted, factors
 from axisight.write_back.xml_edits import Edits, Numbers

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from axisight.effects.stated import LATE_READING
 from axisight.robot_import.bodies import Drive
 from axisight.robot_import.xml_tree import Element
+from axisight.write_back.mjcf.servos import DELAYS_SINCE, delayed
+from axisight.write_back.mjcf.versions import too_old
 from axisight.write_back.placed import Placed, said
-from axisight.write_back.servos import DELAYS_SINCE, delayed
-from axisight.write_back.versions import too_old
 from axisight.write_back.xml_edits import Edits
 
 if TYPE_CHECKING:

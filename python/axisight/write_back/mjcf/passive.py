@@ -11,8 +11,8 @@ from axisight.robot import Robot
 from axisight.robot_import.bodies import Drive
 from axisight.robot_import.load import felt_inertia
 from axisight.robot_import.xml_tree import Element
+from axisight.write_back.mjcf.versions import too_old
 from axisight.write_back.placed import Placed, said
-from axisight.write_back.versions import too_old
 from axisight.write_back.xml_edits import Edits, Numbers
 
 if TYPE_CHECKING:

@@ -33,9 +33,9 @@ from axisight.effects.stated import (
     VISCOUS_FRICTION,
 )
 from axisight.write_back.joints import POLYNOMIALS_SINCE
-from axisight.write_back.passive import SINCE as PASSIVE_SINCE
-from axisight.write_back.servos import DELAYS_SINCE
-from axisight.write_back.versions import OLDEST
+from axisight.write_back.mjcf.passive import SINCE as PASSIVE_SINCE
+from axisight.write_back.mjcf.servos import DELAYS_SINCE
+from axisight.write_back.mjcf.versions import OLDEST
 
 
 @dataclass(frozen=True)

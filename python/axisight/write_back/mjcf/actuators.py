@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING
 from axisight.effects.stated import LAG, OFFSET, TORQUE_CONSTANT, TORQUE_LIMIT, TRANSPORT_DELAY
 from axisight.robot_import.mjcf.actuators import is_gain
 from axisight.robot_import.xml_tree import Element
-from axisight.write_back.limits import LIMIT_EFFECTS, Limits
-from axisight.write_back.placed import Placed, said
-from axisight.write_back.refitted import Refitted
-from axisight.write_back.servos import (
+from axisight.write_back.mjcf.limits import LIMIT_EFFECTS, Limits
+from axisight.write_back.mjcf.servos import (
     DELAYS_SINCE,
     SERVO,
     SERVO_EFFECTS,
@@ -21,7 +19,9 @@ from axisight.write_back.servos import (
     is_servo,
     write_servo,
 )
-from axisight.write_back.versions import too_old
+from axisight.write_back.mjcf.versions import too_old
+from axisight.write_back.placed import Placed, said
+from axisight.write_back.refitted import Refitted
 from axisight.write_back.xml_edits import Edits, Numbers
 
 if TYPE_CHECKING:
