@@ -90,6 +90,18 @@ def test_a_dcmotor_that_is_told_its_torque_is_a_motor_with_a_lag(tmp_path: Path)
         "actuator_bandwidth": pytest.approx([0.002])
     }
     assert robot.parameters()["j.viscous_friction"] == pytest.approx(0.5 / GEAR**2)
+    causes = [
+        several("actuator_bandwidth", 1, time_constant_s=0.005),
+        several("torque_saturation", 1, limit_nm=0.4),
+        several("torque_constant", 1, relative_error=-0.1),
+    ]
+    made = write_model(source, robot, causes, tmp_path / "new.xml")
+    assert made.why == {"torque_constant@1": "a <dcmotor> delivers the torque that it is told"}
+    again = {e.name: e.values() for e in load_robot(made.path).effects}
+    assert again == {
+        "actuator_bandwidth": pytest.approx([0.005]),
+        "torque_saturation": pytest.approx([0.4]),
+    }
     plain = written(tmp_path, model_text(f'{DC} input="ff"/>'), "plain.xml")
     assert torque(plain, 0.0, 2.0, target=0.7) == pytest.approx(GEAR * 0.7)
 

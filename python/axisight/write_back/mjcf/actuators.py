@@ -10,6 +10,7 @@ from axisight.effects.stated import LAG, OFFSET, TORQUE_CONSTANT, TORQUE_LIMIT, 
 from axisight.robot_import.mjcf.actuators import is_gain
 from axisight.robot_import.xml_tree import Element
 from axisight.write_back.mjcf.limits import LIMIT_EFFECTS, Limits
+from axisight.write_back.mjcf.passive import TAG
 from axisight.write_back.mjcf.servos import (
     DELAYS_SINCE,
     SERVO,
@@ -33,6 +34,7 @@ _MOTOR = {"gaintype": "fixed", "biastype": "none", "dyntype": "none"}
 _LAGS = {"dyntype": ("filter", "filterexact")}
 # Attributes by which an actuator names its joint; equivalent on joints with one axis.
 _JOINTS = ("joint", "jointinparent")
+_NO_GAINS = f"expected a <{SERVO}> of the joint, whose gains the file says"
 # MuJoCo's default time step.
 _STEP_S = 0.002
 
@@ -61,6 +63,8 @@ _ATTRIBUTES: Mapping[str, tuple[str, Callable[[float, float], Mapping[str, Numbe
 }
 # Apart from `_ATTRIBUTES`, because they must be converted to the side before the file's gear.
 _OF_MOTORS = frozenset((*_ATTRIBUTES, TORQUE_LIMIT[0], OFFSET[0]))
+# A motor with a current controller has its lag as a time constant of the current.
+_OF_DCMOTORS = frozenset((LAG[0], TRANSPORT_DELAY[0], TORQUE_LIMIT[0]))
 DRIVE_EFFECTS = _OF_MOTORS.union(SERVO_EFFECTS)
 
 
@@ -80,35 +84,59 @@ def write_drive(
     gain nor lag, so it becomes the <general> that it abbreviates, with explicit values against the file's
     defaults.
     """
-    placed, (causes, refitted) = Placed(), found
     holders = [e for e in root.walk() if e.tag == "actuator"]
     mine = [e for h in holders for e in h.children if _drives(e, joint[0])]
-    beyond = [cause for cause in causes if cause.effect in LIMIT_EFFECTS]
-    if beyond and (why := _cannot_limit(limits, joint[1])):
-        placed.refuse(beyond, why)
-        causes = [cause for cause in causes if cause not in beyond]
-    constant = [cause for cause in causes if cause.effect == OFFSET[0]]
-    if constant and any(x != math.inf for x in limits.drive.force_limits):
-        placed.refuse(constant, "the file limits the force of the motor, which would include it")
-        causes = [cause for cause in causes if cause not in constant]
-    late = [cause for cause in causes if cause.effect == TRANSPORT_DELAY[0]]
-    if late and (why := too_old(DELAYS_SINCE, "delays of actuators")):
-        placed.refuse(late, why)
-        causes = [cause for cause in causes if cause not in late]
-    defaults = any(e.tag in ("default", "include") for e in root.walk())
+    refitted = found[1]
+    placed, causes = _possible(found[0], limits, joint[1])
     if len(mine) == 1 and is_servo(mine[0], limits):
         servo = Servo(mine[0], joint[1], limits, _has_ratio_defaults(root))
         return placed.joined(write_servo(edits, servo, causes, refitted, step_of(root)))
-    placed.refuse(refitted, f"expected a <{SERVO}> of the joint, whose gains the file says")
-    stated = [cause for cause in causes if cause.effect not in _OF_MOTORS]
-    placed.refuse(stated, f"expected a <{SERVO}> of the joint, whose gains the file says")
+    placed.refuse(refitted, _NO_GAINS)
+    placed.refuse([cause for cause in causes if cause.effect not in _OF_MOTORS], _NO_GAINS)
     causes = [cause for cause in causes if cause.effect in _OF_MOTORS]
-    if not causes:
-        return placed
-    if len(mine) != 1 or mine[0].children or not _is_motor(mine[0], defaults):
+    defaults = any(e.tag in ("default", "include") for e in root.walk())
+    if len(mine) == 1 and _is_told_torque(mine[0]):
+        beyond = [cause for cause in causes if cause.effect not in _OF_DCMOTORS]
+        placed.refuse(beyond, f"a <{TAG}> delivers the torque that it is told")
+        causes = [cause for cause in causes if cause.effect in _OF_DCMOTORS]
+    elif len(mine) != 1 or mine[0].children or not _is_motor(mine[0], defaults):
         got = "none" if not mine else ", ".join(f"<{e.tag}>" for e in mine)
         placed.refuse(causes, f"expected one motor of the joint that has a gain, got {got}")
-        return placed
+        causes = []
+    if causes:
+        _write_motor(edits, mine[0], joint[1], causes, limits, step_of(root), defaults=defaults)
+        placed.take(causes)
+    return placed
+
+
+def _possible(
+    causes: Sequence[Cause], limits: Limits, joint: Element | None
+) -> tuple[Placed, list[Cause]]:
+    """Return the causes that limits and version of MuJoCo allow, and why not the others."""
+    placed = Placed()
+    beyond = [cause for cause in causes if cause.effect in LIMIT_EFFECTS]
+    if beyond and (why := _cannot_limit(limits, joint)):
+        placed.refuse(beyond, why)
+    constant = [cause for cause in causes if cause.effect == OFFSET[0]]
+    if constant and any(x != math.inf for x in limits.drive.force_limits):
+        placed.refuse(constant, "the file limits the force of the motor, which would include it")
+    late = [cause for cause in causes if cause.effect == TRANSPORT_DELAY[0]]
+    if late and (why := too_old(DELAYS_SINCE, "delays of actuators")):
+        placed.refuse(late, why)
+    return placed, [cause for cause in causes if cause.label not in placed.why_not]
+
+
+def _write_motor(
+    edits: Edits,
+    motor: Element,
+    joint: Element | None,
+    causes: Sequence[Cause],
+    limits: Limits,
+    step_s: float,
+    *,
+    defaults: bool,
+) -> None:
+    """Write causes into a motor; ``defaults``: the file may have defaults for actuators."""
     made: dict[str, Numbers] = {}
     # The last cause of a kind replaces the simulator's effect.
     for cause in causes:
@@ -116,21 +144,27 @@ def write_drive(
             made |= _limit(limits.of_actuator(cause.parameters[TORQUE_LIMIT[1]].value))
         elif cause.effect == OFFSET[0]:
             made |= _biased(limits.signed(cause.parameters[OFFSET[1]].value))
+        elif cause.effect == LAG[0] and motor.tag == TAG:
+            made["inductance"] = (0.0, cause.parameters[LAG[1]].value)
         else:
             name, attributes = _ATTRIBUTES[cause.effect]
-            made |= attributes(cause.parameters[name].value, step_of(root))
+            made |= attributes(cause.parameters[name].value, step_s)
     behind, of_joint = limits.set_by(causes, servo=False)
     made |= behind
-    if of_joint and joint[1] is not None:
-        edits.set(joint[1], of_joint, said([c for c in causes if c.effect in LIMIT_EFFECTS]))
+    if of_joint and joint is not None:
+        edits.set(joint, of_joint, said([c for c in causes if c.effect in LIMIT_EFFECTS]))
     kind = ""
     if made.keys() & {"gainprm", "dyntype", "biasprm"}:
         kind = "general"
-        usual = {"gainprm": "1", **_MOTOR} if defaults and mine[0].tag == "motor" else {}
+        usual = {"gainprm": "1", **_MOTOR} if defaults and motor.tag == "motor" else {}
         made |= {key: value for key, value in usual.items() if key not in made}
-    edits.set(mine[0], made, said(causes), tag=kind)
-    placed.take(causes)
-    return placed
+    edits.set(motor, made, said(causes), tag=kind)
+
+
+def _is_told_torque(element: Element) -> bool:
+    """Return whether an actuator is a DC motor whose only input is its torque."""
+    told = element.attributes.get("input", "").split()
+    return element.tag == TAG and told == ["ff"] and "controller" not in element.attributes
 
 
 def _drives(element: Element, joint: str) -> bool:

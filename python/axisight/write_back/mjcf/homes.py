@@ -89,7 +89,9 @@ _HOMES: Mapping[str, Home] = MappingProxyType(
         OTHER_GAINS[0]: Home(
             "`kp` and `kv` of `<position>`, `<intvelocity>` and `<pid>`, `controller` of `<dcmotor>`"
         ),
-        LAG[0]: Home('`dyntype="filterexact"` and `dynprm` of the motor'),
+        LAG[0]: Home(
+            '`dyntype="filterexact"` and `dynprm` of the motor, `inductance` of a `<dcmotor>`'
+        ),
         TRANSPORT_DELAY[0]: Home("`delay` and `nsample` of the actuator", DELAYS_SINCE, _STEPS),
         LATE_READING[0]: Home(
             "`delay` and `nsample` of `<jointpos>` and `<jointvel>`", DELAYS_SINCE, _STEPS
