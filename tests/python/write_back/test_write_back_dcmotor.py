@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from axisight import Effect, load_robot
+from axisight.mujoco import apply
 from axisight.mujoco.torques import EffectTorques
 from axisight.write_back import write_model
 from found_causes import several
@@ -194,3 +195,20 @@ def test_defaults_of_the_file_do_not_reach_a_passive_actuator(tmp_path: Path):
     assert data.qfrc_actuator[0] == pytest.approx(GEAR * 0.5)
     # The actuators before it keep their numbers.
     assert model.actuator("m").id == 0
+
+
+def test_what_is_added_at_every_step_does_not_take_cogging_for_a_command(tmp_path: Path):
+    """A dead zone of the command is the same on a model with and without cogging beside the motor."""
+    source = written(tmp_path, ARM, "arm.xml")
+    ripple = several("torque_ripple", 1, order_1=6.0, cosine_1_nm=0.5)
+    made = write_model(source, load_robot(source), [ripple], tmp_path / "new.xml")
+    dead = [Effect("torque_deadband", 1, {"width_nm": 0.05})]
+    found = []
+    for path in (source, made.path):
+        model = mujoco.MjModel.from_xml_path(str(path))
+        data = mujoco.MjData(model)
+        mujoco.mj_step1(model, data)
+        data.ctrl[0] = 0.2
+        found.append(apply(model, data, dead, ["shoulder"], gear_ratio=1 / GEAR))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
+    np.testing.assert_allclose(found[0], [-0.05 * GEAR], rtol=1e-6)
