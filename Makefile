@@ -88,6 +88,7 @@ format: $(STAMPS)/test-tools
 
 docs: $(STAMPS)/docs-tools
 	$(BIN)/python docs/make_effects.py
+	$(BIN)/python docs/make_mujoco_homes.py
 	$(BIN)/python docs/make_verdict.py
 	$(BIN)/python docs/make_constants.py
 	$(BIN)/python docs/make_cli.py

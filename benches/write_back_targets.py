@@ -67,12 +67,17 @@ def error_of(path: Path, log: Log) -> Array:
     return np.asarray(np.sqrt((off**2).mean(axis=0)))
 
 
+def settings_of(*, wide: bool) -> Settings:
+    """Return the settings of a diagnosis; ``wide``: nobody knows the gains."""
+    return Settings(tolerances=UNKNOWN) if wide else Settings()
+
+
 def outcome(name: str, folder: Path) -> Outcome:
     """Diagnose a machine by its nominal model, write back what was found, and measure in MuJoCo."""
     arm = CASES[name]
     robot = simulator(folder)
     logs = [arm.log(run) for run in (1, 2, 3)]
-    settings = Settings(tolerances=UNKNOWN) if name.startswith("gains") else Settings()
+    settings = settings_of(wide=name.startswith("gains"))
     found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:], settings=settings)
     made = write_model(
         folder / "arm.xml", robot, found.causes, folder / "new.xml", refit=found.refit

@@ -102,6 +102,33 @@ BRISTLES = ("presliding_friction", "presliding_rad", "relaxation_s")
 In torque predicted from motion this friction always slips, and equals dry friction.
 """
 
+FALLING_FRICTION = (
+    "stribeck_friction",
+    "coulomb_nm",
+    "excess_nm",
+    "stribeck_speed_rad_s",
+    "smoothing_rad_s",
+)
+"""Dry friction that falls from standstill: effect, its level at speed, the excess at rest, speed, corner."""
+
+BRISTLE_SHAPE = ("coulomb_nm", "static_ratio", "stribeck_speed_rad_s", "bristle_time_s")
+"""Parameters of friction with bristles beside those of `BRISTLES`."""
+
+DRAG = ("quadratic_drag", "drag_nm_s2_rad2")
+"""Friction proportional to the squared speed: effect and parameter."""
+
+COGGING = "torque_ripple"
+"""Torque that repeats with the motor angle; `EffectInfo.waves` has its parameters."""
+
+BALANCE = ("gravity_compensation", "sine_nm", "cosine_nm")
+"""Torque of a balance spring on the joint: effect, its sine and its cosine of the joint angle."""
+
+LATE_READING = ("sensor_delay", "delay_s")
+"""Encoder that is read late: effect and parameter."""
+
+OFFSET = ("torque_offset", "offset_nm")
+"""Constant torque of a motor: effect and parameter."""
+
 VISCOUS_FRICTION = "viscous_friction"
 """Friction proportional to speed, beyond the simulator's own."""
 
@@ -171,6 +198,9 @@ TORQUE_SENSOR = ("torque_sensor_gain", "relative_error")
 
 PLAY = ("backlash", "damped")
 """Gear without stiffness in its middle: effect, parameter for the damping there."""
+
+HALF_PLAY = "half_width_rad"
+"""Parameter of `PLAY`: half the width of the middle, joint side."""
 
 WITH_MEMORY = frozenset(
     {

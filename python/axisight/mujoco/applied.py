@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from axisight.effects import Effect
 from axisight.errors import InputError
+from axisight.mujoco.actuators import commanded_forces
 from axisight.mujoco.dynamics import gear_load, library, moves_of
 from axisight.mujoco.end_of_step import torque_at_end
 from axisight.mujoco.gears import Gear
@@ -84,7 +85,7 @@ def apply(
     in_gears = _in_gears(mujoco, model, data, axes, inside, data.qvel)
     load = gear_load(mujoco, model, data)[axes.dofs]
     mujoco.mj_fwdActuation(model, data)
-    command = data.qfrc_actuator[axes.dofs] * ratio
+    command = commanded_forces(model, data)[axes.dofs] * ratio
     known = torques.of_command(command) + in_gears
     data.qfrc_applied[dofs] = known[acting]
     mujoco.mj_fwdAcceleration(model, data)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from axisight.logs import Log
 from axisight.logs.log import not_logged
+from axisight.mujoco.actuators import ON_JOINT, places
 from axisight.robot import Robot
 
 Array = NDArray[np.float64]
@@ -32,8 +33,6 @@ SAYS = (
 _SETTLES_S = 5.0
 # Largest relative difference between the sample time of a log and a multiple of MuJoCo's time step.
 _WHOLE = 1e-6
-# Largest `mjtTrn` of an actuator that acts on a joint: in its frame, or in that of its parent.
-_ON_JOINT = 1
 
 
 def runs_in_mujoco(robot: Robot, logs: Sequence[Log]) -> list[Log]:
@@ -87,16 +86,20 @@ class _Motors:
     def __init__(self, model: Any, robot: Robot) -> None:
         self.model = model
         joints = [model.joint(name) for name in robot.axis_names]
-        on_joints = bool((model.actuator_trntype <= _ON_JOINT).all())
-        only_axes = model.nq == model.nv == model.nu == robot.n_axes
+        on_joints = bool((model.actuator_trntype <= ON_JOINT).all())
+        command, count, output = places(model)
+        told = np.flatnonzero(count > 0)
+        only_axes = model.nq == model.nv == len(told) == robot.n_axes
         # An activation is a state of its own, such as the target of a speed servo.
         self.are_all = only_axes and on_joints and model.na == 0
         self.places = np.array([int(joint.qposadr[0]) for joint in joints])
-        of_joint = {int(model.actuator_trnid[k, 0]): k for k in range(model.nu)}
-        self.controls = np.array([of_joint[int(joint.id)] for joint in joints])
+        of_joint = {int(model.actuator_trnid[k, 0]): int(k) for k in told}
+        own = np.array([of_joint[int(joint.id)] for joint in joints])
+        # The target is the first command; others, such as a target of speed, stay zero.
+        self.controls = command[own]
         self.ratio = np.asarray(robot.gear_ratio)
         # An actuator compares its target with the angle of the joint times its gear.
-        self.gear = self.ratio * model.actuator_gear[self.controls, 0]
+        self.gear = self.ratio * model.actuator_gear[output[own], 0]
 
     def run(self, mujoco: Any, log: Log) -> Log | None:
         """Return the run of a log; None if it is unstable, or its sample time is no multiple of the time step."""

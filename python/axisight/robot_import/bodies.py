@@ -10,6 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects.dcmotor import Device
+
 Array = NDArray[np.float64]
 Motion = Literal["fixed", "revolute", "prismatic", "other"]
 
@@ -94,7 +96,11 @@ class Drive:
     - ``gain``: torque of the motor per command; ``limit_nm``: largest motor torque [Nm]
     - ``delay_s``, ``lag_s``: delay and first-order lag of the torque [s]
     - ``effort``: torque limit of the joint [Nm], 0 if the file states none
-    - ``of_actuators``: the parts of rotor inertia and damping that the file states on actuators
+    - ``drag`` [Nm s^2/rad^2]: damping in proportion to the squared speed
+    - ``of_actuators``: the parts of rotor inertia, damping and drag that the file states on actuators
+    - ``damping_beyond``, ``spring_beyond``: quadratic and cubic coefficients of the joint's own damping and spring
+    - ``devices``: cogging and bristles of actuators
+    - ``offset_nm``: constant torque of the motor [Nm], motor-side; ``reading_delay_s``: delay of its encoder [s]
     - ``force_limits``: limits [Nm] of the only actuator, before the gear, and of the joint; NaN if a limit is
       not the same in both directions
     - ``speed_gain`` [Nm s/rad]: gain of an actuator with speed targets, motor-side
@@ -115,7 +121,13 @@ class Drive:
     delay_s: float = 0.0
     lag_s: float = 0.0
     effort: float = 0.0
-    of_actuators: tuple[float, float] = (0.0, 0.0)
+    drag: float = 0.0
+    of_actuators: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    damping_beyond: tuple[float, float] = (0.0, 0.0)
+    spring_beyond: tuple[float, float] = (0.0, 0.0)
+    devices: tuple[Device, ...] = ()
+    offset_nm: float = 0.0
+    reading_delay_s: float = 0.0
     force_limits: tuple[float, float] = (math.inf, math.inf)
     speed_gain: float | None = None
     sums_up: bool = False
@@ -171,6 +183,7 @@ class Tree:
 
     ``notes`` lists what a chain cannot state. ``steps`` are the time steps of the simulator of the file, None
     if they have no visible effect. ``gravity_m_s2`` (3,) [m/s^2] is None if the file states none.
+    ``gravity_share``: share of it that acts. ``holds_weight``: actuators compensate the weight.
     """
 
     name: str
@@ -179,6 +192,8 @@ class Tree:
     gravity_m_s2: Array | None = None
     notes: list[str] = field(default_factory=list)
     steps: Steps | None = None
+    gravity_share: float = 1.0
+    holds_weight: bool = False
 
     def children(self, name: str) -> list[Body]:
         """Return the bodies whose parent is ``name``."""

@@ -35,7 +35,8 @@ class Chain:
     """A serial chain from a model file, with notes on how it was made.
 
     ``end`` is the pose of the last link's frame in the file, in the frame of the last joint. ``steps`` are
-    the time steps of the simulator of the file.
+    the time steps of the simulator of the file. ``gravity_m_s2`` (3,) is the share ``gravity_share`` of the
+    file's. ``holds_weight``: actuators compensate the weight.
     """
 
     name: str
@@ -44,6 +45,8 @@ class Chain:
     gravity_m_s2: Array
     notes: tuple[str, ...]
     steps: Steps | None = None
+    gravity_share: float = 1.0
+    holds_weight: bool = False
 
 
 STANDARD_GRAVITY_M_S2 = 9.81
@@ -80,7 +83,16 @@ def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Cha
     gravity = tree.gravity_m_s2
     if gravity is None:
         gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
-    return Chain(tree.name, tuple(joints), end, gravity, (*tree.notes, *notes), tree.steps)
+    return Chain(
+        tree.name,
+        tuple(joints),
+        end,
+        gravity * tree.gravity_share,
+        (*tree.notes, *notes),
+        tree.steps,
+        tree.gravity_share,
+        tree.holds_weight,
+    )
 
 
 def _listed(names: Sequence[str] | dict[str, Body]) -> str:
@@ -95,6 +107,14 @@ def _only_end(tree: Tree, first: str) -> str:
         shown = [tree.bodies[end].of or end for end in ends]
         paths = [[body.name for body in tree.path(end)] for end in ends]
         trunk = [name for name in paths[0] if all(name in path for path in paths)]
+        robots = _robots(tree, trunk[-1], paths)
+        if len(robots) > 1:
+            raise RobotError(
+                f"{tree.bodies[first].where}: expected one robot, got {len(robots)} that stand apart: give the body "
+                f"on which the one that is meant stands, --base (of diagnose, check, columns guess, explore, "
+                f"simulate, excite and robot import) or base = '...' in the drive data beside the file, one of "
+                f"{_listed(robots)}"
+            )
         raise RobotError(
             f"{tree.bodies[trunk[-1]].where}: expected one serial chain below {first!r}, got {len(ends)} moving "
             f"branches: give the last link of the one that is meant, --tip (of diagnose, "
@@ -103,6 +123,18 @@ def _only_end(tree: Tree, first: str) -> str:
             f"{_listed(shown)} and part at {trunk[-1]}); other branches are locked at zero"
         )
     return (tree.bodies[ends[0]].of or ends[0]) if ends else first
+
+
+def _robots(tree: Tree, trunk: str, paths: Sequence[Sequence[str]]) -> list[str]:
+    """Return the fixed bodies on the root on which several robots stand; empty if one of them has none.
+
+    ``trunk``: body at which the ``paths`` to the ends part.
+    """
+    if tree.bodies[trunk].parent is not None:
+        return []
+    first = list(dict.fromkeys(path[path.index(trunk) + 1] for path in paths))
+    fixed = [name for name in first if tree.bodies[name].motion == "fixed"]
+    return fixed if len(fixed) == len(first) else []
 
 
 def _ends(tree: Tree, first: str) -> list[str]:

@@ -9,11 +9,15 @@ import tomlkit
 
 from axisight.arguments import shown
 from axisight.effects import effect_info
+from axisight.effects.dcmotor import effects_of
 from axisight.effects.stated import (
+    DRAG,
     DRY_FRICTION,
     JOINT_SPRING,
     LAG,
+    LATE_READING,
     LEAD,
+    OFFSET,
     TORQUE_CONSTANT,
     TORQUE_LIMIT,
     TRANSPORT_DELAY,
@@ -60,6 +64,7 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
             )
         effects += _torque_path(joint.body.drive, number, ratio)
         effects += _dry_friction(joint.body.drive, drive.coulomb_friction, number, ratio)
+        effects += _motor_effects(joint.body.drive, number, ratio)
     document: dict[str, Any] = {
         "schema": "axisight.robot/2",
         "name": chain.name,
@@ -114,6 +119,8 @@ def controller_of(chain: Chain, drives: DriveData) -> dict[str, Any] | None:
         "velocity_feedforward": False,
         "continuous": True,
     }
+    if chain.holds_weight:
+        out["gravity_compensation"] = True
     if chain.steps is not None:
         added = [
             chain.steps.added_inertia(kd, drive.damping * drive.gear_ratio**2) * other
@@ -239,6 +246,22 @@ def _torque_path(drive: Drive, axis: int, ratio: float) -> list[dict[str, Any]]:
         for (name, parameter), value in values.items()
         if value != 0
     ]
+
+
+def _motor_effects(drive: Drive, axis: int, ratio: float) -> list[dict[str, Any]]:
+    """Return drag, cogging and bristles, constant torque and a late encoder of an axis as effects."""
+    values = {
+        DRAG: drive.drag * abs(ratio) ** 3,
+        OFFSET: drive.offset_nm * ratio / drive.gear_ratio,
+        LATE_READING: 0.0 if drive.servo is not None else drive.reading_delay_s,
+    }
+    out: list[dict[str, Any]] = [
+        {"name": name, "axis": axis, parameter: value}
+        for (name, parameter), value in values.items()
+        if value != 0
+    ]
+    found, _ = effects_of(drive.devices, axis, ratio)
+    return out + [{"name": e.name, "axis": axis, **(e.parameters or {})} for e in found]
 
 
 def _dry_friction(

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from axisight.errors import RobotError
 from axisight.robot.robot import Robot
@@ -108,6 +109,16 @@ def step_of_servos(robot: Robot) -> float:
     time = robot.sample_time_s
     if robot.controller_kind != "pd_position":
         return time
+    felt = felt_inertia(robot)
+    slowing_s = float(np.min(felt / np.maximum(robot.controller_gains["kd"], 1e-300)))
+    return float(time / np.ceil(time / min(_SERVO_STEP_S, _SLOWED * slowing_s)))
+
+
+def felt_inertia(robot: Robot) -> NDArray[np.float64]:
+    """Return the inertia (n_axes,) [kg m^2] that each motor accelerates if all other joints are free to move.
+
+    Motor side, at the operating point.
+    """
     rest = np.zeros(robot.n_joints)
     rest[robot.axis_joints] = robot.operating_point
     inertia = robot.inertia_matrix(rest)
@@ -115,10 +126,8 @@ def step_of_servos(robot: Robot) -> float:
         drive = robot.joints[joint].drive
         assert drive is not None  # every axis has a drive
         inertia[joint, joint] += drive.motor_inertia / drive.gear_ratio**2
-    # The inertia that a motor accelerates if all other joints are free to move.
-    felt = robot.gear_ratio**2 / np.diag(np.linalg.inv(inertia))[robot.axis_joints]
-    slowing_s = float(np.min(felt / np.maximum(robot.controller_gains["kd"], 1e-300)))
-    return float(time / np.ceil(time / min(_SERVO_STEP_S, _SLOWED * slowing_s)))
+    felt = np.diag(np.linalg.inv(inertia))[robot.axis_joints]
+    return np.asarray(robot.gear_ratio**2 / felt)
 
 
 def bodies_and_chain(

@@ -196,7 +196,10 @@ def angle_unit(root: Element) -> float:
 
 def _gravity(edits: Edits, root: Element, chain: Chain, cause: Cause) -> str:
     """Rotate the gravity of an MJCF; return why that failed, else empty."""
-    gravity = {"gravity": _level(cause).apply(chain.gravity_m_s2).tolist()}
+    if chain.gravity_share == 0:
+        return "all weight is compensated"
+    tilted = _level(cause).apply(chain.gravity_m_s2) / chain.gravity_share
+    gravity = {"gravity": tilted.tolist()}
     options = root.all("option")
     own = [e for e in options if "gravity" in e.attributes]
     if not own and any(_all(root, "include")):

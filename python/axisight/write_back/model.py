@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from axisight import storage
 from axisight.display.summary import summarized
 from axisight.effects import Effect
-from axisight.effects.stated import OTHER_GAINS
+from axisight.effects.dcmotor import DEVICE_EFFECTS
+from axisight.effects.stated import OTHER_GAINS, PLAY
 from axisight.errors import InputError
 from axisight.mujoco.torques import acts_in_gear, is_torque
 from axisight.robot import Robot
@@ -20,12 +21,15 @@ from axisight.robot_import.bodies import Drive
 from axisight.robot_import.drives import DriveData
 from axisight.robot_import.load import bodies_and_chain, drive_data
 from axisight.robot_import.xml_tree import Element, parse_xml
-from axisight.write_back.actuators import DRIVE_EFFECTS, write_drive
 from axisight.write_back.frames import FRAME_EFFECTS, write_frames
 from axisight.write_back.inertials import write_bodies
 from axisight.write_back.joints import JOINT_NUMBERS, write_joint
-from axisight.write_back.limits import limits_of
 from axisight.write_back.links import LINK_EFFECTS, body_changes
+from axisight.write_back.mjcf.actuators import DRIVE_EFFECTS, step_of, write_drive
+from axisight.write_back.mjcf.limits import limits_of
+from axisight.write_back.mjcf.passive import write_devices
+from axisight.write_back.mjcf.play import is_play, write_play
+from axisight.write_back.mjcf.readings import READING_EFFECTS, write_readings
 from axisight.write_back.placed import Labelled, Placed, doubt
 from axisight.write_back.refitted import Refitted, refitted_gains
 from axisight.write_back.xml_edits import Edits
@@ -68,6 +72,7 @@ def write_model(
     refit: Mapping[str, Interval] = MappingProxyType({}),
     overwrite: bool = False,
     drives: DriveData | None = None,
+    play_joints: bool = False,
 ) -> Written:
     """Write the model of a diagnosis with its causes, and return what it contains.
 
@@ -88,6 +93,8 @@ def write_model(
         Replace an existing file.
     drives
         The drive data ``robot`` was read with; None: those beside the file.
+    play_joints
+        Write backlash into an MJCF as a joint of its own with a range, which adds a position to the model.
 
     Raises InputError as `check_target` does, and for a ``source`` that is no URDF or MJCF in UTF-8.
     """
@@ -95,7 +102,7 @@ def write_model(
     path, gains = Path(target), refitted_gains(robot, refit)
     if path.suffix.lower() == ".toml":
         return _as_robot_file(robot, causes, gains, path, overwrite=overwrite)
-    return _as_model((Path(source), drives), robot, (causes, gains), path)
+    return _as_model((Path(source), drives), robot, (causes, gains), path, play_joints=play_joints)
 
 
 def check_target(source: Path | str, target: Path | str, *, overwrite: bool = False) -> None:
@@ -139,7 +146,9 @@ def _as_robot_file(
 _Found = tuple[Sequence["Cause"], Sequence[Refitted]]
 
 
-def _as_model(origin: _Source, robot: Robot, found: _Found, path: Path) -> Written:
+def _as_model(
+    origin: _Source, robot: Robot, found: _Found, path: Path, *, play_joints: bool
+) -> Written:
     source, (causes, gains) = origin[0], found
     text = source.read_bytes()
     root = parse_xml(text, str(source))
@@ -150,6 +159,8 @@ def _as_model(origin: _Source, robot: Robot, found: _Found, path: Path) -> Writt
         *_on_axes(edits, root, origin, robot, found),
         *_on_chain(edits, root, origin, robot, causes),
     ]
+    if play_joints and root.tag == "mujoco":
+        done += _plays(edits, root, origin, robot, causes)
     why = {label: reason for placed in done for label, reason in placed.why_not.items()}
     there = {label for placed in done for label in placed.there} - set(why)
     try:
@@ -174,9 +185,7 @@ def _on_axes(
 ) -> list[Placed]:
     """Write the findings on joints and motors, axis by axis."""
     causes, gains = found
-    # Only these elements hold joints: transmissions, actuators and constraints name joints by the same tag.
-    holders = [root] if root.tag == "robot" else [e for e in root.walk() if e.tag == "body"]
-    joints = {e.attributes.get("name"): e for holder in holders for e in holder.all("joint")}
+    joints = _joints(root)
     out = []
     is_mjcf = root.tag == "mujoco"
     known, own_law = _drives_of(source, found) if is_mjcf else ({}, False)
@@ -185,30 +194,59 @@ def _on_axes(
         numbers = [cause for cause in mine if cause.effect in JOINT_NUMBERS[root.tag]]
         if numbers and name in joints:
             out.append(
-                write_joint(
-                    edits, root, joints[name], robot, axis, numbers, _of_actuators(known.get(name))
-                )
+                write_joint(edits, root, joints[name], robot, axis, numbers, known.get(name))
             )
+        devices = [cause for cause in mine if cause.effect in DEVICE_EFFECTS and is_mjcf]
+        if devices and name in known:
+            drive, step_s = known[name], step_of(root)
+            out.append(write_devices(edits, root, drive, robot, axis, devices, step_s))
+        late = [cause for cause in mine if cause.effect in READING_EFFECTS and is_mjcf]
+        if late and name in known:
+            out.append(write_readings(edits, root, name, known[name], late, step_of(root)))
         drives = [cause for cause in mine if cause.effect in DRIVE_EFFECTS]
         refitted = [gain for gain in gains if gain.axis == axis + 1 and own_law]
         if (drives or refitted) and is_mjcf:
-            placed, drive = Placed(), known.get(name)
+            placed = Placed()
             if not own_law:
                 gained = [cause for cause in drives if cause.effect == OTHER_GAINS[0]]
                 placed.refuse(gained, _NO_LAW)
                 drives = [cause for cause in drives if cause not in gained]
-            if drive is None:
+            if name not in known:
                 placed.refuse([*drives, *refitted], _NO_JOINT)
             else:
-                limits, joint = limits_of(drive, robot, axis), (name, joints.get(name))
+                limits, joint = limits_of(known[name], robot, axis), (name, joints.get(name))
                 made = write_drive(edits, root, joint, (drives, refitted), limits)
                 placed = placed.joined(made)
             out.append(placed)
     return out
 
 
-# Numbers that joints and actuators can both have.
-_SHARED = ("armature", "damping")
+def _plays(
+    edits: Edits, root: Element, source: _Source, robot: Robot, causes: Sequence[Cause]
+) -> list[Placed]:
+    """Write backlash as joints of their own."""
+    plays = [cause for cause in causes if is_play(cause)]
+    if not plays:
+        return []
+    file, drives = source
+    _, chain = bodies_and_chain(file, drives or drive_data(file))
+    known = {joint.body.joint: joint.body.drive for joint in chain.joints}
+    joints = _joints(root)
+    out = []
+    for cause in plays:
+        assert cause.axis is not None  # backlash is of one axis
+        name = robot.axis_names[cause.axis - 1]
+        drive = known.get(name, Drive())
+        step_s = step_of(root)
+        out.append(write_play(edits, root, joints.get(name), drive, robot, cause, step_s))
+    return out
+
+
+def _joints(root: Element) -> dict[str | None, Element]:
+    """Return the joints of a model by name."""
+    # Only these elements hold joints: transmissions, actuators and constraints name joints by the same tag.
+    holders = [root] if root.tag == "robot" else [e for e in root.walk() if e.tag == "body"]
+    return {e.attributes.get("name"): e for holder in holders for e in holder.all("joint")}
 
 
 def _drives_of(source: _Source, found: _Found) -> tuple[dict[str, Drive], bool]:
@@ -217,18 +255,13 @@ def _drives_of(source: _Source, found: _Found) -> tuple[dict[str, Drive], bool]:
     Empty if the findings need no drive.
     """
     causes, gains = found
-    shared = any(JOINT_NUMBERS["mujoco"].get(cause.effect) in _SHARED for cause in causes)
-    if not shared and not gains and not any(cause.effect in DRIVE_EFFECTS for cause in causes):
+    on_joints = (*JOINT_NUMBERS["mujoco"], *DRIVE_EFFECTS, *DEVICE_EFFECTS, *READING_EFFECTS)
+    if not gains and not any(cause.effect in on_joints for cause in causes):
         return {}, False
     file, given = source
     drives = given or drive_data(file)
     _, chain = bodies_and_chain(file, drives)
     return {joint.body.joint: joint.body.drive for joint in chain.joints}, drives.controller is None
-
-
-def _of_actuators(drive: Drive | None) -> dict[str, float]:
-    """Return the part of each joint number that the actuators state."""
-    return {} if drive is None else dict(zip(_SHARED, drive.of_actuators, strict=True))
 
 
 def _on_chain(
@@ -258,6 +291,11 @@ def _no_number(root: Element, effect: Effect) -> str:
     """Return why no number of a model can express an effect."""
     if root.tag == "mujoco" and is_torque(effect):
         return "MJCF has no number for it: axisight.mujoco.apply adds it at every step"
+    if root.tag == "mujoco" and effect.name == PLAY[0]:
+        return (
+            "MJCF has no number for it: write_model(..., play_joints=True) writes a joint with a range, "
+            "axisight.mujoco.apply adds it to a joint that is the gear's spring"
+        )
     if root.tag == "mujoco" and acts_in_gear(effect):
         return "MJCF has no number for it: axisight.mujoco.apply adds it to a joint that is the gear's spring"
     return f"{'MJCF' if root.tag == 'mujoco' else 'URDF'} has no number for it"

@@ -5,9 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from xml.sax.saxutils import escape
 
 from axisight.errors import RobotError
 from axisight.robot_import.xml_tree import Element
+
+# Of attribute values beside those of any text.
+_ENTITIES = {'"': "&quot;"}
 
 Numbers = float | Sequence[float] | str
 
@@ -72,6 +76,54 @@ class Edits:
         closed = b"</" + element.tag.encode() + b">"
         self._replace(start, end, tag[:-2].rstrip() + b">" + more + self._indent(start) + closed)
 
+    def add_after(
+        self, element: Element, attributes: Mapping[str, Numbers], comment: str = ""
+    ) -> None:
+        """Insert an element with the same tag and other attributes after one, with a comment above it."""
+        start, tag = self._tag(element)
+        end = start + len(tag)
+        if not tag.endswith(b"/>"):
+            closing = self._end(element, start)
+            end = self.text.index(b">", closing) + 1
+        made = f"<{element.tag}/>".encode()
+        for name, value in attributes.items():
+            made = _with(made, name, value)
+        indent = self._indent(start)
+        self._replace(end, end, (indent + _comment(comment) if comment else b"") + indent + made)
+
+    def append(
+        self,
+        element: Element,
+        children: Sequence[tuple[str, Mapping[str, Numbers]]],
+        comment: str = "",
+        *,
+        within: str = "",
+    ) -> None:
+        """Insert children with attributes as the last of an element, with a comment above the first.
+
+        ``within``: a new element around them.
+        """
+        start, tag = self._tag(element)
+        outer = self._indent(start)
+        inner = outer + (b"    " if within else b"  ")
+        more = inner + _comment(comment) if comment else b""
+        for child, attributes in children:
+            made = f"<{child}/>".encode()
+            for name, value in attributes.items():
+                made = _with(made, name, value)
+            more += inner + made
+        if within:
+            around = within.encode()
+            more = outer + b"  <" + around + b">" + more + outer + b"  </" + around + b">"
+        if tag.endswith(b"/>"):
+            closed = b"</" + element.tag.encode() + b">"
+            self._replace(start, start + len(tag), tag[:-2].rstrip() + b">" + more + outer + closed)
+            return
+        end = self._end(element, start)
+        # Blanks before the closing tag stay its indentation.
+        end -= len(self.text[start:end]) - len(self.text[start:end].rstrip())
+        self._replace(end, end, more)
+
     def result(self) -> bytes:
         """Return the text with all changes. Raises RobotError for two changes at one place."""
         out, at = [], 0
@@ -115,6 +167,22 @@ class Edits:
             raise RobotError(f"{element.where}: expected no content, its text cannot be edited")
         return found.group(1), found.end()
 
+    def _end(self, element: Element, start: int) -> int:
+        """Return the place of the closing tag of an element that starts at ``start``, comments skipped."""
+        tag = re.escape(element.tag.encode())
+        pattern = re.compile(
+            rb"<!--.*?-->|<" + tag + rb"(?=[\s/>])[^>]*>|</" + tag + rb"\s*>", re.S
+        )
+        depth = 0
+        for found in pattern.finditer(self.text, start):
+            text = found.group()
+            if text.startswith(b"<!--"):
+                continue
+            depth += -1 if text.startswith(b"</") else not text.endswith(b"/>")
+            if depth == 0:
+                return found.start()
+        raise RobotError(f"{element.where}: its text cannot be edited")
+
     def _indent(self, start: int) -> bytes:
         """Return the line break and indentation before an element; empty if another comes first there."""
         line = self.text.rfind(b"\n", 0, start) + 1
@@ -131,7 +199,7 @@ def _with(tag: bytes, name: str, value: Numbers) -> bytes:
     """Return a start tag with an attribute set."""
     numbers = [value] if isinstance(value, int | float) else value
     text = value if isinstance(value, str) else " ".join(f"{x:.10g}" for x in numbers)
-    said = f'"{text}"'.encode()
+    said = f'"{escape(text, _ENTITIES)}"'.encode()
     known = _attribute(name)
     if known.search(tag):
         return known.sub(lambda m: m.group(1) + said, tag, count=1)

@@ -68,6 +68,18 @@ def test_runs_are_those_of_mujoco(tmp_path: Path, more: str):
     np.testing.assert_allclose(run.position_rad, log.position_rad, atol=1e-6)
 
 
+def test_actuators_with_other_numbers_of_commands_are_run(tmp_path: Path):
+    """A <pid> that takes speeds too and a passive motor before it: the run is that of the same servo."""
+    if not hasattr(mujoco.MjModel, "actuator_ctrlnum"):
+        pytest.skip("MuJoCo before 3.12 has one command for each actuator")
+    log = recorded(model(tmp_path), 1, noise_rad=0.0)
+    nothing = 'motorconst="1e-9 0" resistance="1" input="none" cogging="1e-9 7 0"'
+    first = f'<dcmotor joint="elbow" {nothing}/><pid joint="lift" kp="800" kv="40"/>'
+    path = model(tmp_path, first=first)
+    (run,) = runs_in_mujoco(import_robot(path, sample_time_s=STEP_S), [log])
+    np.testing.assert_allclose(run.position_rad, log.position_rad, atol=1e-6)
+
+
 def test_what_an_import_leaves_out_is_no_cause(tmp_path: Path):
     path = model(tmp_path, TENDON)
     logs = [recorded(path, seed) for seed in (1, 2, 3)]

@@ -234,7 +234,29 @@ def test_an_inertia_that_no_body_has_is_listed(tmp_path: Path, name: str):
 
 
 MOTOR = '<motor joint="shoulder" gear="50"/>'
+
+
 # What a chain has no number for: where it stands, and what is said of it.
+def test_a_file_of_several_robots_asks_for_the_base_of_one(tmp_path: Path):
+    """With a base, the robot that stands on it is imported, with its own joints only."""
+    pytest.importorskip("mujoco", reason="MuJoCo comes with the extra `mujoco`")
+    mass = '<inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.1 0.1"/>'
+    arms = "".join(
+        f'<body name="{side}"><geom size="0.1" mass="5"/><body name="{side}_link">'
+        f'<joint name="{side}_joint" axis="0 1 0"/>{mass}</body></body>'
+        for side in ("left", "right")
+    )
+    path = written(tmp_path, f"<mujoco><worldbody>{arms}</worldbody></mujoco>", "arm.xml")
+    with pytest.raises(RobotError, match=r"2 that stand apart.*--base.*one of left, right$"):
+        import_robot(path)
+    assert import_robot(path, base="right").joint_names == ["right_joint"]
+    # One that stands on no body of its own is told by its tip.
+    bare = f'<body name="bare"><joint name="third" axis="0 1 0"/>{mass}</body></worldbody>'
+    path = written(tmp_path, path.read_text().replace("</worldbody>", bare), "arm.xml")
+    with pytest.raises(RobotError, match=r"3 moving branches.*--tip"):
+        import_robot(path)
+
+
 BEYOND = {
     "gravcomp": (
         'name="lower"',
@@ -300,7 +322,7 @@ BEYOND = {
     "damping": (
         'damping="0.7"',
         'damping="0.7 0 2"',
-        "joint 'shoulder': damping beyond the linear left out",
+        "joint 'shoulder': cubic damping left out",
     ),
     "yielding": (
         'stiffness="3"',
@@ -309,8 +331,8 @@ BEYOND = {
     ),
     "damping of a motor": (
         MOTOR,
-        '<motor name="m" joint="shoulder" damping="1 2"/>',
-        "actuator 'm': damping beyond the linear left out",
+        '<motor name="m" joint="shoulder" damping="1 0 2"/>',
+        "actuator 'm': cubic damping left out",
     ),
 }
 
@@ -369,7 +391,7 @@ def test_mujoco_is_named_where_it_is_missing(tmp_path: Path, monkeypatch: pytest
     def no(name: str):
         raise ImportError(name)
 
-    monkeypatch.setattr("axisight.robot_import.mjcf.import_module", no)
+    monkeypatch.setattr("axisight.robot_import.mjcf.reader.import_module", no)
     with pytest.raises(MissingExtraError, match=r"axisight\[mujoco\]"):
         import_robot(written(tmp_path, MJCF, "arm.xml"))
 

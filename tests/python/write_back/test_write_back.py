@@ -392,17 +392,19 @@ def test_what_has_no_place_is_told_why(tmp_path: Path):
     source = written(tmp_path, MJCF, "arm.xml")
     robot = load_robot(source)
     ripple = several("torque_ripple", 1, order_1=6.0, cosine_1_nm=0.1)
+    loaded = several("load_dependent_friction", 1, coefficient=0.1)
     lighter = several("viscous_friction", 1, viscous_nm_s_rad=-1.0)
     thinner = several("link_inertia", 2, relative_change=-0.9)
     servo = several("torque_constant", 2, relative_error=0.1)
-    causes = [PLAY, ripple, lighter, thinner, servo]
+    causes = [PLAY, loaded, lighter, thinner, servo]
     made = write_model(source, robot, causes, tmp_path / "new.xml")
     assert made.placed == ()
     assert made.path.read_bytes() == source.read_bytes()
     assert [effect.label for effect in made.remaining] == [c.label for c in causes]
     assert made.why == {
-        "backlash@1": "MJCF has no number for it: axisight.mujoco.apply adds it to a joint that is the gear's spring",
-        "torque_ripple@1": "MJCF has no number for it: axisight.mujoco.apply adds it at every step",
+        "backlash@1": "MJCF has no number for it: write_model(..., play_joints=True) writes a joint with a range, "
+        "axisight.mujoco.apply adds it to a joint that is the gear's spring",
+        "load_dependent_friction@1": "MJCF has no number for it: axisight.mujoco.apply adds it at every step",
         "viscous_friction@1": "damping would be -2499, and models have none below zero",
         "link_inertia@2": "'lower' has no mass of its own",
         "torque_constant@2": "expected one motor of the joint that has a gain, got none",

@@ -141,6 +141,9 @@ def test_no_other_file_knows_an_effect_by_name(repository: Path) -> None:
         # A key of controllers that are told positions.
         "robot_file/reader.rs": {"gravity_compensation"},
         "gap/controller/speed_loop.py": {"gravity_compensation"},
+        "robot_import/description.py": {"gravity_compensation"},
+        # A field of MuJoCo's models.
+        "robot_import/mjcf/sensors.py": {"sensor_delay"},
         # A load that is mounted, as drive data or a log state it.
         "cli/model_options.py": {"payload"},
         "fitting/loads.py": {"payload"},

@@ -23,8 +23,10 @@ from axisight.robot_import.bodies import (
     mimics,
     still,
 )
-from axisight.robot_import.mjcf_actuators import Actuators
-from axisight.robot_import.mjcf_notes import notes_of
+from axisight.robot_import.mjcf.actuators import Actuators, numbers
+from axisight.robot_import.mjcf.gravity import Compensation, compensation
+from axisight.robot_import.mjcf.notes import notes_of
+from axisight.robot_import.mjcf.sensors import reading_delay_s
 from axisight.robot_import.outside import with_includes
 from axisight.robot_import.xml_tree import Element
 
@@ -117,15 +119,17 @@ class _Compiled:
             bodies[names[i]] = Body(
                 names[i], parent, "", "fixed", pose, np.zeros(3), self._mass(i), where
             )
-        tree = Tree(
+        weight = compensation(model) or Compensation()
+        return Tree(
             self._model_name(),
             bodies,
             str(self.path),
             np.array(model.opt.gravity),
             notes_of(model, self._name),
             self._steps(),
+            weight.gravity_share,
+            weight.by_actuators,
         )
-        return tree
 
     def _steps(self) -> Steps | None:
         """Return the time steps of the integrator; None for Runge-Kutta, whose step error is negligible."""
@@ -170,7 +174,8 @@ class _Compiled:
         if motion != "other":
             dof, zero = model.jnt_dofadr[j], float(model.qpos0[model.jnt_qposadr[j]])
             at = at @ _moved(motion, axis, -zero)
-            rotor, damper = actuators.added(j)
+            added = rotor, damper, drag = actuators.added(j)
+            of_joint = _beyond(model, "dof_dampingpoly", dof)
             drive = Drive(
                 actuators.ratios().get(j, 1.0),
                 float(model.dof_armature[dof]) + rotor,
@@ -181,7 +186,13 @@ class _Compiled:
                 float(model.qpos_spring[model.jnt_qposadr[j]]),
                 actuators.servos().get(j),
                 *actuators.torque_path(j),
-                of_actuators=(rotor, damper),
+                drag=of_joint[0] + drag,
+                of_actuators=added,
+                damping_beyond=of_joint,
+                spring_beyond=_beyond(model, "jnt_stiffnesspoly", j),
+                devices=actuators.devices(j),
+                offset_nm=actuators.offset_nm(j),
+                reading_delay_s=reading_delay_s(model, j),
                 force_limits=actuators.force_limits(j),
                 speed_gain=actuators.speed_gains().get(j),
                 sums_up=actuators.has_sum(j),
@@ -238,16 +249,18 @@ class _Compiled:
 
     def _name(self, kind: str, i: int) -> str:
         """Return the name of an element, or ``<kind> <number>`` if it has none."""
-        known = {
-            "body": self.mujoco.mjtObj.mjOBJ_BODY,
-            "joint": self.mujoco.mjtObj.mjOBJ_JOINT,
-            "actuator": self.mujoco.mjtObj.mjOBJ_ACTUATOR,
-        }
-        name = self.mujoco.mj_id2name(self.model, known[kind], i)
+        known = getattr(self.mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        name = self.mujoco.mj_id2name(self.model, known, i)
         return name or f"{kind} {i}"
 
     def _where(self, tag: str, name: str) -> str:
         return self.lines.get((tag, name), f"{self.path}, <{tag} {name!r}>")
+
+
+def _beyond(model: Any, name: str, i: int) -> tuple[float, float]:
+    """Return the quadratic and cubic coefficient of a force of degree of freedom or joint ``i``."""
+    first, second = numbers(model, name, np.zeros((i + 1, 2)))[i, :2].tolist()
+    return first, second
 
 
 def _rotation(quaternion: Array) -> Array:

@@ -41,6 +41,10 @@ class Limits:
         """Return a motor-side limit [Nm] as a limit before the file's gear."""
         return limit_nm * abs(self.drive.gear_ratio / self.ratio)
 
+    def signed(self, torque_nm: float) -> float:
+        """Return a motor-side torque [Nm] as a torque before the file's gear, with its sign."""
+        return torque_nm * self.drive.gear_ratio / self.ratio
+
     def set_by(
         self, causes: Sequence[Cause], *, servo: bool
     ) -> tuple[Mapping[str, Numbers], Mapping[str, Numbers]]:

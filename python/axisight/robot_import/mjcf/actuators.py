@@ -9,8 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from axisight.effects.dcmotor import Device
+from axisight.robot_import.mjcf.motors import Motors
+
 Array = NDArray[np.float64]
 
+# MuJoCo's number of the bias that is linear in position and speed.
+_AFFINE = 1
 # Range of torque per command in which an actuator may be a motor; outside it, commands are not torques.
 _GAINS = (0.2, 3.0)
 # MuJoCo's numbers of the actuator dynamics that are first-order lags.
@@ -53,18 +58,35 @@ class Actuators:
         every = np.arange(n)
         # An actuator may have several commands and outputs, so these have their own numbers.
         command = np.asarray(getattr(model, "actuator_ctrladr", every), dtype=int)
+        has_command = np.asarray(getattr(model, "actuator_ctrlnum", np.ones(n))) > 0
         output = np.asarray(getattr(model, "actuator_outadr", every), dtype=int)
         of_joint = np.isin(model.actuator_trntype, _OF_JOINTS)
-        self.joint = np.where(of_joint, model.actuator_trnid[:, 0], -1)
         self.gear = model.actuator_gear[output, 0]
+        motors = Motors(model, self.gear)
+        self.motors = [motors.motor(i) for i in range(n)]
+        self.laws = [motors.law(i) for i in range(n)]
+        passive = np.array([m is not None and m.is_passive for m in self.motors], dtype=bool)
+        self.acts_on = np.where(of_joint, model.actuator_trnid[:, 0], -1)
+        self.joint = np.where(passive, -1, self.acts_on)
         self.armature = numbers(model, "actuator_armature", np.zeros(n))
         self.damping = numbers(model, "actuator_damping", np.zeros(n))
         self.delay = numbers(model, "actuator_delay", np.zeros(n))
-        self.gain = model.actuator_gainprm[:, 0]
+        self.drag = numbers(model, "actuator_dampingpoly", np.zeros((n, 1)))[:, 0]
+        told = [m is not None and (m.is_told_torque or m.is_told_voltage) for m in self.motors]
+        self.gain = np.where(told, 1.0, model.actuator_gainprm[:, 0])
+        self.braking = np.array([0.0 if m is None else m.braking_nm_s_rad for m in self.motors])
         filters = np.isin(model.actuator_dyntype, _FILTERS)
         self.lag = np.where(filters, model.actuator_dynprm[:, 0], 0.0)
-        self.command_limit = limits_of(
-            model.actuator_ctrllimited[command], model.actuator_ctrlrange[command]
+        for i, motor in enumerate(self.motors):
+            if motor is not None and motor.is_told_torque:
+                self.lag[i] = motor.lag_s
+        self.offset = np.where(
+            model.actuator_biastype == _AFFINE, model.actuator_biasprm[:, 0], 0.0
+        )
+        self.command_limit = np.full(n, np.inf)
+        self.command_limit[has_command] = limits_of(
+            model.actuator_ctrllimited[command[has_command]],
+            model.actuator_ctrlrange[command[has_command]],
         )
         self.force_limit = limits_of(
             model.actuator_forcelimited[output], model.actuator_forcerange[output]
@@ -72,9 +94,17 @@ class Actuators:
         self.joint_limit = limits_of(model.jnt_actfrclimited, model.jnt_actfrcrange)
 
     def is_motor(self, i: int) -> bool:
-        """Whether actuator ``i`` is a source of torque: a gain near 1, no bias, no state except a lag."""
-        model = self.model
-        plain = model.actuator_gaintype[i] == 0 and model.actuator_biastype[i] == 0
+        """Whether actuator ``i`` is a source of torque: a gain near 1, no state except a lag.
+
+        It may have a constant bias. A ``dcmotor`` is one if its only input is its torque or its voltage.
+        """
+        model, motor = self.model, self.motors[i]
+        if motor is not None:
+            return motor.is_told_torque or motor.is_told_voltage
+        unbiased = model.actuator_biastype[i] == 0 or (
+            model.actuator_biastype[i] == _AFFINE and not np.any(model.actuator_biasprm[i, 1:3])
+        )
+        plain = model.actuator_gaintype[i] == 0 and unbiased
         torque = is_gain(float(self.gain[i]))
         return bool(plain and torque and model.actuator_dyntype[i] in (0, *_FILTERS))
 
@@ -83,11 +113,20 @@ class Actuators:
 
         Its command is the target, or the speed of the target (`sums_up`).
         """
+        motor, own = self.motors[i], self.laws[i]
+        if own is not None:
+            return own.is_servo if motor is None else motor.is_servo
         kp, bias = self.gain[i], self.model.actuator_biasprm[i]
-        law = bias[0] == 0 and bias[1] == -kp and bias[2] <= 0 and kp > 0
+        law = bias[1] == -kp and bias[2] <= 0 and kp > 0
         return bool(
             self._is_affine(i) and law and self.model.actuator_dyntype[i] in (0, _INTEGRATOR)
         )
+
+    def filtered_servo_s(self, i: int) -> float:
+        """Return the time constant [s] by which a position servo lags its targets; 0 for other actuators."""
+        kp, bias = self.gain[i], self.model.actuator_biasprm[i]
+        law = self._is_affine(i) and bias[1] == -kp and kp > 0
+        return float(self.lag[i]) if law else 0.0
 
     def sums_up(self, i: int) -> bool:
         """Whether actuator ``i`` integrates speed commands to its target, which is its activation."""
@@ -105,7 +144,7 @@ class Actuators:
 
     def _is_affine(self, i: int) -> bool:
         model = self.model
-        return bool(model.actuator_gaintype[i] == 0 and model.actuator_biastype[i] == 1)
+        return bool(model.actuator_gaintype[i] == 0 and model.actuator_biastype[i] == _AFFINE)
 
     def known(self) -> Mapping[int, list[int]]:
         """Return the motors and position servos by joint; a speed servo counts if it is the only actuator."""
@@ -136,10 +175,26 @@ class Actuators:
         """
         joints = self.joint.tolist()
         return {
-            joints[i]: (float(self.gain[i]), -float(self.model.actuator_biasprm[i, 2]))
+            joints[i]: self._gains(i)
             for i in range(self.n)
             if joints[i] >= 0 and joints.count(joints[i]) == 1 and self.is_servo(i)
         }
+
+    def _gains(self, i: int) -> tuple[float, float]:
+        """Return the gains of the position servo ``i``."""
+        law = self.laws[i]
+        if law is not None:
+            return law.kp, law.kd
+        return float(self.gain[i]), -float(self.model.actuator_biasprm[i, 2])
+
+    def devices(self, j: int) -> tuple[Device, ...]:
+        """Return cogging and bristles of all motors that act on joint ``j``."""
+        found = [m for i, m in enumerate(self.motors) if m is not None and self.acts_on[i] == j]
+        return tuple(device for motor in found for device in motor.devices)
+
+    def offset_nm(self, j: int) -> float:
+        """Return the constant torque [Nm], before the gear, of the only motor or servo of joint ``j``."""
+        return self.of_one(self.offset).get(j, 0.0)
 
     def speed_gains(self) -> dict[int, float]:
         """Return the gain [Nm s/rad], by joint, for joints whose only actuator is a speed servo."""
@@ -177,8 +232,9 @@ class Actuators:
         given = _least(behind[0], behind[1] / gear)
         if not self.is_motor(i):
             return given
-        # The command limit acts before gain and lag, so a force limit is equivalent only without a lag.
-        told = given / float(self.gain[i]) if self.lag[i] == 0 else math.inf
+        # The command limit acts before gain, lag and offset, so a force limit is equivalent only without these.
+        plain = self.lag[i] == 0 and self.offset[i] == 0
+        told = given / float(self.gain[i]) if plain else math.inf
         return _least(self.command_limit[i], told)
 
     def force_limits(self, j: int) -> tuple[float, float]:
@@ -187,11 +243,16 @@ class Actuators:
         of_actuator = float(self.force_limit[own[0]]) if len(own) == 1 else math.inf
         return of_actuator, float(self.joint_limit[j]) if j in self.joint else math.inf
 
-    def added(self, j: int) -> tuple[float, float]:
-        """Return inertia [kg m^2] and damping [Nm s/rad] that actuators add to joint ``j``, joint-side."""
-        own = self.joint == j
-        squared = self.gear[own] ** 2
-        return float(self.armature[own] @ squared), float(self.damping[own] @ squared)
+    def added(self, j: int) -> tuple[float, float, float]:
+        """Return what actuators add to joint ``j``, joint-side.
+
+        These are inertia [kg m^2], damping [Nm s/rad] and drag [Nm s^2/rad^2].
+        """
+        own = self.acts_on == j
+        squared, damping = self.gear[own] ** 2, self.damping[own] + self.braking[own]
+        # MuJoCo multiplies all coefficients of damping by the squared gear, and takes the speed of the joint.
+        drag = self.drag[own] @ squared
+        return float(self.armature[own] @ squared), float(damping @ squared), float(drag)
 
 
 def _least(*limits: float) -> float:
