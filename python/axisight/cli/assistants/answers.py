@@ -80,7 +80,7 @@ class DiagnosisAnswer(BaseModel):
 class ExplainAnswer(BaseModel):
     """How a verdict came about."""
 
-    diagnosis: str
+    diagnosis: str = Field(description="Number of the diagnosis, or name of the verdict file.")
     comparisons: list[str]
     moves: list[str]
     rules: list[str]
