@@ -12,6 +12,7 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight.errors import MissingExtraError, RobotError
+from axisight.robot import JointLimits
 from axisight.robot_import.bodies import (
     Body,
     Drive,
@@ -24,6 +25,7 @@ from axisight.robot_import.bodies import (
     still,
 )
 from axisight.robot_import.mjcf_actuators import Actuators
+from axisight.robot_import.mjcf_joint_limits import limits_of_joint
 from axisight.robot_import.mjcf_notes import notes_of
 from axisight.robot_import.outside import with_includes
 from axisight.robot_import.xml_tree import Element
@@ -188,7 +190,6 @@ class _Compiled:
             )
         else:
             drive = Drive()
-        limits = tuple(map(float, model.jnt_range[j])) if model.jnt_limited[j] else None
         # The arrow makes the name unique, as names in MuJoCo cannot contain it.
         return Body(
             f"{body}\N{RIGHTWARDS ARROW}{name}",
@@ -200,7 +201,7 @@ class _Compiled:
             None,
             where,
             drive,
-            limits,  # type: ignore[arg-type]
+            JointLimits() if motion == "other" else limits_of_joint(actuators, j),
             refused,
             bare=bare,
             of=body,

@@ -221,7 +221,8 @@ class DiagnosisTools:
         """Design the next experiment after a diagnosis: it tells open causes apart, or shows an effect.
 
         After an unknown verdict it is a record that shows more. Repeats the diagnosis, so takes as long as it did.
-        Limits default to what the logs reach. A person has to check the motion before a robot runs it.
+        Limits default to those of the robot's model, else to what the logs reach.
+        A person has to check the motion before a robot runs it.
         """
         kept = self._diagnoses.get(diagnosis)
         target = self.folder.write("write_to", write_to)
@@ -289,5 +290,6 @@ def _experiment(
         period_s=None if plan is None else plan.references.period_s,
         repeats=None if plan is None else plan.repeats,
         peak_rad_s=peaks,
+        limits=[] if plan is None else [str(limit) for limit in plan.limits],
         written=written,
     )

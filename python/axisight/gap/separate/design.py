@@ -112,6 +112,7 @@ def planned(route: Route, motion: Motion, repeats: int, times_shorter: float = 1
         repeats,
         times_shorter,
         route.usual,
+        route.limits.told(),
     )
 
 
