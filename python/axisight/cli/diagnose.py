@@ -208,7 +208,8 @@ def diagnose_command(
         typer.Option(
             metavar="VALUE,...",
             rich_help_panel=EXPERIMENT,
-            help="Velocity limit of each motor, or of all (rad/s). Default: what the logs reach.",
+            help="Velocity limit of each motor, or of all (rad/s). Default: the robot's model, else what the logs "
+            "reach.",
         ),
     ] = None,
     travel_limit: Annotated[
@@ -216,7 +217,8 @@ def diagnose_command(
         typer.Option(
             metavar="VALUE,...",
             rich_help_panel=EXPERIMENT,
-            help="Travel of each motor, or of all, either way (rad). Default: what the logs reach.",
+            help="Travel of each motor, or of all, either way (rad). Default: the robot's model, else what the logs "
+            "reach.",
         ),
     ] = None,
     torque_limit: Annotated[
@@ -224,7 +226,7 @@ def diagnose_command(
         typer.Option(
             metavar="VALUE,...",
             rich_help_panel=EXPERIMENT,
-            help="Torque limit of each motor, or of all (Nm). Default: what the logs reach.",
+            help="Torque limit of each motor, or of all (Nm). Default: the robot's model, else what the logs reach.",
         ),
     ] = None,
     acceleration_limit: Annotated[
@@ -232,8 +234,8 @@ def diagnose_command(
         typer.Option(
             metavar="VALUE,...",
             rich_help_panel=EXPERIMENT,
-            help="Acceleration limit of each motor, or of all (rad/s^2). Default: what the logs reach; none "
-            "under velocity references.",
+            help="Acceleration limit of each motor, or of all (rad/s^2). Default: the robot's model, else what the "
+            "logs reach; none under velocity references.",
         ),
     ] = None,
     room: Annotated[

@@ -2,7 +2,17 @@
 
 from axisight.robot.accelerometer import Accelerometer
 from axisight.robot.description import Drive, Joint, Link, Spring
+from axisight.robot.limits import JointLimits
 from axisight.robot.loading import load_robot
 from axisight.robot.robot import Robot
 
-__all__ = ["Accelerometer", "Drive", "Joint", "Link", "Robot", "Spring", "load_robot"]
+__all__ = [
+    "Accelerometer",
+    "Drive",
+    "Joint",
+    "JointLimits",
+    "Link",
+    "Robot",
+    "Spring",
+    "load_robot",
+]

@@ -25,6 +25,7 @@ from axisight.robot.accelerometer import (
 )
 from axisight.robot.axis_names import axis_number, effect_on
 from axisight.robot.description import Joint, joint_of
+from axisight.robot.limits import JointLimits, limits_of
 
 Array = NDArray[np.float64]
 
@@ -55,21 +56,23 @@ class Robot:
         self._torque_constants: tuple[float | None, ...] = (None,) * core.n_axes
         self._states_pose = True
         self._imported_from: Path | None = None
-        self._joint_ranges: tuple[tuple[float, float] | None, ...] = (None,) * core.n_axes
+        self._joint_limits = (JointLimits(),) * core.n_axes
 
     def _with_core(self, core: _core.Robot) -> Robot:
         """Return a robot with another core and what the core does not hold."""
         out = Robot(core)
         out._torque_constants = self._torque_constants
         out._states_pose = self._states_pose
-        out._joint_ranges = self._joint_ranges
+        out._joint_limits = self._joint_limits
         return out
 
     @classmethod
     def from_toml(cls, text: str) -> Robot:
         """Return the robot of a description `text`; raise RobotError naming line, key and expectation."""
         out = cls(_core.Robot.from_toml(text))
-        out._states_pose = "operating_point" in tomllib.loads(text)
+        document = tomllib.loads(text)
+        out._states_pose = "operating_point" in document
+        out._joint_limits = limits_of(document)
         return out
 
     def __repr__(self) -> str:
@@ -333,27 +336,29 @@ class Robot:
 
     @property
     def joint_ranges(self) -> tuple[tuple[float, float] | None, ...]:
-        """Smallest and largest angle of each driven joint [rad or m]; None where the model file states none.
+        """Smallest and largest angle of each driven joint [rad or m]; None where the description states none."""
+        return tuple(limits.position for limits in self._joint_limits)
 
-        A robot file states none. No simulation stops at them.
+    @property
+    def joint_limits(self) -> tuple[JointLimits, ...]:
+        """What each driven joint may do (n_axes), as the description states it.
+
+        Experiments stay within these limits. No simulation stops at them.
         """
-        return self._joint_ranges
+        return self._joint_limits
 
-    def as_imported(
-        self,
-        source: Path | None,
-        *,
-        states_pose: bool,
-        joint_ranges: Sequence[tuple[float, float] | None] | None = None,
-    ) -> Robot:
-        """Return the same robot with its `imported_from`, `states_operating_point` and `joint_ranges`.
+    def with_joint_limits(self, limits: Sequence[JointLimits]) -> Robot:
+        """Return the same robot with other `joint_limits` (n_axes); raise InputError for another number."""
+        if len(limits) != self.n_axes:
+            raise InputError(f"limits: expected {self.n_axes} entries, got {len(limits)}")
+        out = self._with_core(self.core)
+        out._joint_limits = tuple(instance("limits", one, JointLimits) for one in limits)
+        return out
 
-        Without ``joint_ranges`` the robot keeps its own.
-        """
+    def as_imported(self, source: Path | None, *, states_pose: bool) -> Robot:
+        """Return the same robot with its `imported_from` and `states_operating_point`."""
         out = self._with_core(self.core)
         out._imported_from, out._states_pose = source, states_pose
-        if joint_ranges is not None:
-            out._joint_ranges = tuple(joint_ranges)
         return out
 
     def with_sample_time(self, sample_time_s: float) -> Robot:

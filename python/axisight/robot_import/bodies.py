@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects.dcmotor import Device
+from axisight.robot import JointLimits
 
 Array = NDArray[np.float64]
 Motion = Literal["fixed", "revolute", "prismatic", "other"]
@@ -171,7 +172,7 @@ class Body:
     mass: Mass | None
     where: str
     drive: Drive = Drive()
-    limits: tuple[float, float] | None = None
+    limits: JointLimits = field(default_factory=JointLimits)
     refused: str = ""
     bare: bool = False
     of: str = ""

@@ -226,6 +226,8 @@ def _joint(joint: ChainJoint, mass: Mass | None, drive: JointDrive) -> tuple[dic
         "motor_inertia": float(rotor),
         "viscous_friction": float(viscous),
     }
+    if limits := joint.body.limits.stated():
+        table["limits"] = limits
     return table, ratio
 
 
@@ -296,7 +298,7 @@ def _rest(joints: list[ChainJoint]) -> list[float]:
     """Return the default operating point: zero, or the middle of the range if zero is outside."""
     out = []
     for joint in joints:
-        lower, upper = joint.body.limits or (0.0, 0.0)
+        lower, upper = joint.body.limits.position or (0.0, 0.0)
         out.append(0.0 if lower <= 0.0 <= upper else (lower + upper) / 2)
     return out
 

@@ -84,11 +84,7 @@ def import_robot(
         try:
             robot = Robot.from_toml(description(chain, stated, named))
             robot = robot.with_torque_constants(torque_constants(chain, stated))
-            return robot.as_imported(
-                alone,
-                states_pose=drives.operating_point is not None,
-                joint_ranges=[joint.body.limits for joint in chain.joints],
-            )
+            return robot.as_imported(alone, states_pose=drives.operating_point is not None)
         except RobotError as error:
             raise RobotError(f"{tree.file}: what was made of it is no robot: {error}") from None
 

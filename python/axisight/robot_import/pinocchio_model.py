@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import RobotError
+from axisight.robot import JointLimits
 from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, still
 
 Array = NDArray[np.float64]
@@ -44,7 +45,7 @@ def _body(model: Any, i: int) -> Body:
         _mass(model.inertias[i]),
         f"{model.name}, joint {model.names[i]!r}",
         _drive(model, joint.idx_v) if motion != "other" else Drive(),
-        _limits(model, joint) if motion != "other" else None,
+        _limits(model, joint) if motion != "other" else JointLimits(),
         ""
         if motion != "other"
         else f"expected joints of one degree of freedom between base and tip, got {joint.shortname()}: "
@@ -79,8 +80,14 @@ def _drive(model: Any, v: int) -> Drive:
     return Drive(1.0 / gear, rotor, float(model.damping[v]), dry)
 
 
-def _limits(model: Any, joint: Any) -> tuple[float, float] | None:
+def _limits(model: Any, joint: Any) -> JointLimits:
     lower, upper = (
         float(x[joint.idx_q]) for x in (model.lowerPositionLimit, model.upperPositionLimit)
     )
-    return (lower, upper) if joint.nq == 1 and np.isfinite([lower, upper]).all() else None
+    bounded = joint.nq == 1 and np.isfinite([lower, upper]).all() and lower < upper
+    speed, effort = (float(x[joint.idx_v]) for x in (model.velocityLimit, model.effortLimit))
+    return JointLimits(
+        (lower, upper) if bounded else None,
+        velocity=speed if 0 < speed < np.inf else None,
+        effort=effort if 0 < effort < np.inf else None,
+    )

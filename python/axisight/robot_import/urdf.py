@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from axisight.arguments import shown
 from axisight.errors import RobotError
+from axisight.robot import JointLimits
 from axisight.robot_import.bodies import Body, Drive, Mass, Motion, Pose, Tree, mimics, still
 from axisight.robot_import.urdf_transmissions import gear_ratios
 from axisight.robot_import.xml_tree import Element
@@ -222,11 +223,29 @@ def _drive(joint: Element, ratio: float) -> Drive:
     return Drive(ratio, damping=found["damping"], friction=found["friction"], effort=effort)
 
 
-def _limits(joint: Element, kind: str) -> tuple[float, float] | None:
+def _limits(joint: Element, kind: str) -> JointLimits:
+    """Return the limits of a joint; a speed or an effort of zero or none states no limit."""
     limit = joint.find("limit")
-    if limit is None or kind == "continuous":
-        return None
+    if limit is None:
+        return JointLimits()
+    effort = limit.number("effort", 0.0)
+    return JointLimits(
+        None if kind == "continuous" else _range(limit),
+        velocity=_speed(limit),
+        effort=effort if effort > 0 else None,
+    )
+
+
+def _range(limit: Element) -> tuple[float, float] | None:
     lower, upper = limit.number("lower", 0.0), limit.number("upper", 0.0)
     if lower > upper:
         raise RobotError(f"{limit.where}: expected lower <= upper, got {lower:g} and {upper:g}")
     return None if lower == upper else (lower, upper)
+
+
+def _speed(limit: Element) -> float | None:
+    # Some tools write an infinite speed for a joint without a limit.
+    if limit.attributes.get("velocity", "").strip().lstrip("+").lower() in ("inf", "infinity"):
+        return None
+    speed = limit.number("velocity", 0.0)
+    return speed if speed > 0 else None

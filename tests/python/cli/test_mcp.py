@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import threading
@@ -196,6 +197,51 @@ def test_diagnosis_equals_that_of_the_library(folder: Path, found: Any) -> None:
 def quick(found: Any) -> Callable[..., Any]:
     """Return a diagnosis that takes no time."""
     return lambda **_: found
+
+
+def test_a_verdict_file_is_explained_as_the_diagnosis_that_wrote_it(
+    folder: Path, found: Any
+) -> None:
+    """Identity: the file holds the whole trace, removed hypotheses and broken losses included."""
+    found.save_verdict(folder / "verdict.json")
+
+    async def ask(client: Client) -> tuple[Any, Any]:
+        good(await client.call_tool("diagnose", {"case": "case"}))
+        return (
+            await client.call_tool("explain", {"diagnosis": "d1"}),
+            await client.call_tool("explain", {"verdict": "verdict.json"}),
+        )
+
+    of_number, of_file = asked(make_server(folder, run=quick(found)), ask)
+    expected = good(of_number) | {"diagnosis": "verdict.json"}
+    assert good(of_file) == expected and expected["comparisons"]
+    assert of_file.content[0].text == f"{found.headline}\n{of_number.content[0].text}"
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({}, "diagnosis, verdict: expected one of them"),
+        ({"diagnosis": "d1", "verdict": "verdict.json"}, "diagnosis, verdict: expected one"),
+        ({"verdict": "verdict.json", "tables": True}, "tables: expected false"),
+        ({"verdict": "../verdict.json"}, "without ..,"),
+        ({"verdict": "none.json"}, "verdict: expected a file or folder"),
+        ({"verdict": LOG}, "cannot be read"),
+        ({"verdict": "bare.json"}, "trace: expected the trace of a diagnosis, got None"),
+        ({"verdict": "broken.json"}, "trace.comparisons.0.round"),
+    ],
+)
+def test_what_is_no_verdict_is_not_explained(
+    folder: Path, found: Any, given: dict[str, Any], says: str
+) -> None:
+    verdict = found.to_verdict()
+    files = {"verdict": verdict, "bare": {k: v for k, v in verdict.items() if k != "trace"}}
+    trace = verdict["trace"]
+    first = {**trace["comparisons"][0], "round": "first"}
+    files["broken"] = {**verdict, "trace": {**trace, "comparisons": [first]}}
+    for name, content in files.items():
+        (folder / f"{name}.json").write_text(json.dumps(content), "utf-8")
+    assert says in refused(called(make_server(folder), "explain", **given))
 
 
 def test_a_short_answer_leaves_out_large_tables(folder: Path, found: Any) -> None:

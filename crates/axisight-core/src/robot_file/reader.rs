@@ -10,6 +10,7 @@ use super::accelerometers::read_accelerometers;
 use super::document::{Entry, Section, line_at, one_of};
 use super::effects::{read_effects, read_tolerances};
 use super::error::RobotError;
+use super::limits::check_limits;
 use crate::robot::MOST_JOINTS;
 use crate::robot::description::{
     Bound, Compliance, Controller, Drive, Joint, Known, Link, Motion, RobotDescription, Stepped,
@@ -45,6 +46,8 @@ const JOINT_KEYS: &[&str] = &[
     "link",
     "drive",
 ];
+/// Key of a joint in version 2 only.
+const NEWER_JOINT_KEY: &str = "limits";
 const LINK_KEYS: &[&str] = &["mass", "com", "inertia"];
 const DRIVE_KEYS: &[&str] = &["gear_ratio", "motor_inertia", "viscous_friction"];
 
@@ -81,7 +84,7 @@ pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
         sample_time,
         joints: sections
             .iter()
-            .map(read_named_joint)
+            .map(|section| read_named_joint(section, version))
             .collect::<Result<_, _>>()?,
         controller: Controller::None,
         position_noise_std: 0.0,
@@ -154,16 +157,20 @@ fn check_chain(
     Ok(())
 }
 
-fn read_named_joint(section: &Section) -> Result<Joint, RobotError> {
+fn read_named_joint(section: &Section, version: usize) -> Result<Joint, RobotError> {
     let name = section.find("name").and_then(|entry| entry.value.as_str());
-    read_joint(section).map_err(|error| match name {
+    read_joint(section, version).map_err(|error| match name {
         Some(name) => error.of_joint(name),
         None => error,
     })
 }
 
-fn read_joint(section: &Section) -> Result<Joint, RobotError> {
-    section.only(JOINT_KEYS)?;
+fn read_joint(section: &Section, version: usize) -> Result<Joint, RobotError> {
+    if version == 1 {
+        section.only(JOINT_KEYS)?;
+    } else {
+        section.only(&[JOINT_KEYS, &[NEWER_JOINT_KEY]].concat())?;
+    }
     let kinds = [("driven", true), ("elastic", false)];
     let motions = [
         ("revolute", Motion::Revolute),
@@ -191,6 +198,9 @@ fn read_joint(section: &Section) -> Result<Joint, RobotError> {
         refuse_drive(section)?;
         None
     };
+    if let Some(limits) = section.find(NEWER_JOINT_KEY) {
+        check_limits(&limits, motion, driven)?;
+    }
     Ok(Joint {
         name,
         motion,

@@ -80,7 +80,7 @@ class DiagnosisAnswer(BaseModel):
 class ExplainAnswer(BaseModel):
     """How a verdict came about."""
 
-    diagnosis: str
+    diagnosis: str = Field(description="Number of the diagnosis, or name of the verdict file.")
     comparisons: list[str]
     moves: list[str]
     rules: list[str]
@@ -98,6 +98,9 @@ class ExperimentAnswer(BaseModel):
     period_s: float | None = Field(description="Duration of one period in s.")
     repeats: int | None = Field(description="How often to run the period.")
     peak_rad_s: list[float] = Field(description="Largest motor speed of each axis in rad/s.")
+    limits: list[str] = Field(
+        description="Limits of the motors, each with its source: as given, robot's model or logs."
+    )
     written: list[str] = Field(description="Files written.")
 
 

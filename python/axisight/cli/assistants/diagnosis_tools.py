@@ -24,6 +24,7 @@ from axisight.cli.assistants.answers import (
 )
 from axisight.cli.assistants.folder import Folder
 from axisight.cli.assistants.running import Diagnoses, Kept
+from axisight.cli.assistants.verdict_files import verdict_file
 from axisight.cli.assistants.words import next_calls
 from axisight.cli.common import write_each
 from axisight.cli.model_options import ModelOptions
@@ -36,6 +37,7 @@ from axisight.effects import Effect
 from axisight.errors import InputError
 from axisight.gap import Diagnosis, ExperimentLimits, Settings
 from axisight.gap.facts.experiment import Experiment, experiment_files
+from axisight.gap.facts.trace import Trace
 from axisight.gap.intake.inputs import Inputs, read_inputs
 from axisight.gap.prepare.used_part import Used
 from axisight.gap.separate.asked import LIMITS
@@ -165,22 +167,37 @@ class DiagnosisTools:
 
     @told_errors
     async def explain(
-        self, diagnosis: fields.Number, tables: fields.Tables = False
+        self,
+        diagnosis: fields.NumberOrNone = None,
+        verdict: fields.VerdictFile = None,
+        tables: fields.Tables = False,
     ) -> Annotated[CallToolResult, ExplainAnswer]:
         """Say how the verdict of a diagnosis came about: comparisons, why rivals lost, moves, rules.
 
-        Log-odds are in nats. Computes nothing new.
+        Of a diagnosis of this server by its number, or of a verdict file in the folder. Log-odds are in nats. Computes
+        nothing new.
         """
-        found = self._diagnoses.get(diagnosis).found
-        told = account(found.trace)
-        text = "\n".join(told.lines())
-        if tables:
-            with OUT.recorded() as said:
-                show_diagnosis(found, verbose=True)
-            text = f"{said()}\n{text}"
+        if (diagnosis is None) == (verdict is None):
+            raise InputError("diagnosis, verdict: expected one of them, got both or neither")
+        if verdict is not None:
+            if tables:
+                raise InputError("tables: expected false beside a verdict file, got true")
+            head, trace = verdict_file(self.folder, verdict)
+            return self._explained(verdict, trace, f"{head}\n")
+        found = self._diagnoses.get(str(diagnosis)).found
+        if not tables:
+            return self._explained(str(diagnosis), found.trace)
+        with OUT.recorded() as said:
+            show_diagnosis(found, verbose=True)
+        return self._explained(str(diagnosis), found.trace, f"{said()}\n")
+
+    def _explained(self, name: str, trace: Trace, head: str = "") -> CallToolResult:
+        """Return the account of a trace, below the text ``head``."""
+        told = account(trace)
+        text = head + "\n".join(told.lines())
         first = [line for head, rivals in told.comparisons for line in (head, *rivals)]
         content = ExplainAnswer(
-            diagnosis=diagnosis,
+            diagnosis=name,
             comparisons=first,
             moves=[*told.moves, *told.named],
             rules=list(told.rules),
@@ -204,7 +221,8 @@ class DiagnosisTools:
         """Design the next experiment after a diagnosis: it tells open causes apart, or shows an effect.
 
         After an unknown verdict it is a record that shows more. Repeats the diagnosis, so takes as long as it did.
-        Limits default to what the logs reach. A person has to check the motion before a robot runs it.
+        Limits default to those of the robot's model, else to what the logs reach.
+        A person has to check the motion before a robot runs it.
         """
         kept = self._diagnoses.get(diagnosis)
         target = self.folder.write("write_to", write_to)
@@ -272,5 +290,6 @@ def _experiment(
         period_s=None if plan is None else plan.references.period_s,
         repeats=None if plan is None else plan.repeats,
         peak_rad_s=peaks,
+        limits=[] if plan is None else [str(limit) for limit in plan.limits],
         written=written,
     )

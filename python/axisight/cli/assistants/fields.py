@@ -105,8 +105,19 @@ WriteExperiment = Annotated[
     ),
 ]
 Number = Annotated[str, _text("Number of a diagnosis, as diagnose returned it, such as 'd1'.")]
+NumberOrNone = Annotated[
+    str | None,
+    _text("Number of a diagnosis, as diagnose returned it, such as 'd1'; without it, verdict."),
+]
+VerdictFile = Annotated[
+    str | None, _text("A verdict in the folder, a .json file of diagnose, in place of the number.")
+]
 Tables = Annotated[
-    bool, _text("Also return all tables as text: pooled gap, re-fit, ranking, detection limits.")
+    bool,
+    _text(
+        "Also return all tables as text: pooled gap, re-fit, ranking, detection limits. "
+        "Only with the number of a diagnosis: a verdict file is data already."
+    ),
 ]
 ToShow = Annotated[
     str | None,

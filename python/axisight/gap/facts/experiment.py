@@ -5,8 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from axisight.display.summary import summarized
 from axisight.effects import Effect
@@ -17,12 +19,57 @@ from axisight.logs import Load
 from axisight.paths import JointTrajectory, write_joint_trajectory
 from axisight.storage import write_whole
 
+Array = NDArray[np.float64]
+Source = Literal["given", "model", "logs"]
+
 # Log-likelihood ratio at which the wrong rival has a probability below 5 %.
 ENOUGH = float(np.log(19.0))
 # Size, relative to the detection limit, at which an effect is also named, with 90 % probability.
 NAMED = 2.0
 # Up to the first a multisine counts as equally long, from the second as too long to be of use.
 _AS_WELL, _NEVER = 1.5, 90.0
+
+_WORDS: dict[Source, str] = {"given": "as given", "model": "robot's model", "logs": "logs"}
+
+
+@summarized
+@dataclass(frozen=True, eq=False)
+class MotionLimit:
+    """Limit of one quantity of the motors.
+
+    - ``quantity``: speed, acceleration, travel or torque; ``unit``.
+    - ``low``, ``high`` (n_axes,): smallest and largest value, infinite without a limit. Travel counts from the start of
+      the motion.
+    - ``source``: of each axis: ``given`` by the user, stated by the robot's ``model``, or what the ``logs`` reach.
+    """
+
+    quantity: str
+    unit: str
+    low: Array
+    high: Array
+    source: tuple[Source, ...]
+
+    def __str__(self) -> str:
+        """The values with their source; axes of the same source stand together."""
+        groups = [
+            (source, [k for k, one in enumerate(self.source) if one == source])
+            for source in dict.fromkeys(self.source)
+        ]
+        parts = [self._part(source, axes, len(groups) == 1) for source, axes in groups]
+        return f"{self.quantity}: {'; '.join(parts)}"
+
+    def _part(self, source: Source, axes: list[int], alone: bool) -> str:
+        values = [self._value(k) for k in axes]
+        # One value where all axes have the same.
+        values = values[:1] if len(set(values)) == 1 else values
+        free = bool(np.isinf(self.high[axes]).all())
+        said = "no limit" if free else f"{', '.join(values)} {self.unit}"
+        where = "" if alone else f"axis {', '.join(str(k + 1) for k in axes)}: "
+        return f"{where}{said} ({_WORDS[source]})"
+
+    def _value(self, axis: int) -> str:
+        low, high = float(self.low[axis]), float(self.high[axis])
+        return f"{high:.3g}" if low == -high else f"{low:.3g} to {high:.3g}"
 
 
 @summarized
@@ -34,6 +81,7 @@ class Plan:
     - ``references``: velocity references of the motors, from rest to rest; ``trajectory``: the same motion as positions
       of the joints.
     - ``times_shorter``: how many times as long the motion ``usual`` would have to be to tell as much, may be infinite.
+    - ``limits``: what the motors may do in it, and where each limit comes from.
     """
 
     motion: str
@@ -43,6 +91,7 @@ class Plan:
     repeats: int
     times_shorter: float
     usual: str = "A multisine on all axes"
+    limits: tuple[MotionLimit, ...] = ()
 
     def __str__(self) -> str:
         """What moves, where and how long."""
@@ -106,7 +155,8 @@ class Experiment(ABC):
 
     def _write_text(self, folder: Path | str) -> Path:
         text = Path(folder) / _TEXT
-        write_whole(text, f"{self}\n")
+        limits = [_LIMITS, *(f"- {limit}" for limit in self.plan.limits)]
+        write_whole(text, "\n".join([str(self), *(limits if self.plan.limits else [])]) + "\n")
         return text
 
 
@@ -136,7 +186,7 @@ class SeparatingExperiment(Experiment):
             return (
                 f"No motion within the limits of speed, travel and torque tells {one} from {other}. "
                 f"The best one tried ({_begun_small(self.plan)}) makes the true one "
-                f"{np.exp(self.log_ratio):.2g} times as likely."
+                f"{np.exp(self.log_ratio):.2g} times as likely.{_within(self.plan)}"
             )
         still = "".join(
             f" It does not tell {listed([placed(x) for x in pair], 'from')}." for pair in self.alike
@@ -175,7 +225,7 @@ class ShowingExperiment(Experiment):
             )
             return (
                 f"No motion within the limits of speed, travel and torque shows {what}. With the "
-                f"best one tried ({_begun_small(self.plan)}) it {larger}."
+                f"best one tried ({_begun_small(self.plan)}) it {larger}.{_within(self.plan)}"
             )
         named = "" if self.share >= NAMED else " It may be seen without being named."
         return (
@@ -230,6 +280,7 @@ class RecordExperiment(Experiment):
 
 # Text of an experiment; prefixes of the three motions of a record, and all prefixes.
 _TEXT = "experiment.txt"
+_LIMITS = "Limits of the motors, with their source; nothing here knows obstacles, cables or the other links:"
 _RECORD = ("repeat_", "slow_", "loaded_")
 
 
@@ -244,6 +295,11 @@ def experiment_files(folder: Path | str) -> list[Path]:
     """Return all files that `Experiment.write` may write into a folder."""
     motions = (path for prefix in ("", *_RECORD) for path in motion_files(folder, prefix))
     return [*motions, Path(folder) / _TEXT]
+
+
+def _within(plan: Plan) -> str:
+    """Return the limits of a motion that was not enough, as a sentence."""
+    return f" Limits of the motors: {'; '.join(map(str, plan.limits))}." if plan.limits else ""
 
 
 def _begun_small(plan: Plan) -> str:

@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from axisight.arguments import counted
 from axisight.display.summary import summarized
 
@@ -189,3 +191,24 @@ class Trace:
     def to_dict(self) -> dict[str, Any]:
         """Return the trace as the verdict's JSON has it; removed hypotheses have null for nats."""
         return asdict(self)
+
+    @classmethod
+    def from_dict(cls, document: Mapping[str, Any]) -> Trace:
+        """Return a trace from the verdict's JSON, without keys that it does not know.
+
+        Raises ValueError, with the place, for any other document.
+        """
+        return TypeAdapter(cls).validate_python(_with_numbers(document))
+
+
+# Numbers that JSON cannot express, by the key that has null in their place.
+_NOT_FINITE = {"nats": -math.inf, "loss_before": math.nan, "loss_after": math.nan}
+
+
+def _with_numbers(value: Any, key: str = "") -> Any:
+    """Return a document with numbers in place of the nulls that stand for them."""
+    if isinstance(value, Mapping):
+        return {k: _with_numbers(v, k) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_with_numbers(v) for v in value]
+    return _NOT_FINITE.get(key) if value is None else value

@@ -496,8 +496,10 @@ class SearchRound:
         """Return the posteriors without those whose leader is coupled with the effect that gains most in total.
 
         These wait for the next round, when that effect is in the model. The effect's own axis stays: it must lead
-        there.
+        there. Without any candidate there is nothing to be coupled with.
         """
+        if not standings:
+            return standings
         fall = falls(trials, self.current, self.layout)
         place = {t.label: i for i, t in enumerate(trials)}
         leaders = [place[s.best.trial.label] for s in standings]

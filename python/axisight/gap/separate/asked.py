@@ -36,7 +36,7 @@ class Asked:
     """A request for an experiment: one that separates the remaining rivals, or one that shows what logs hide.
 
     ``to_show``: the effect with the size that must show, `LIMITS` for a record, None to separate rivals; ``within``:
-    limits of the motors in place of those seen in the logs.
+    limits of the motors in place of those of the robot and the logs.
     """
 
     to_show: Effect | str | None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,13 +113,23 @@ def planned(route: Route, motion: Motion, repeats: int, times_shorter: float = 1
         repeats,
         times_shorter,
         route.usual,
+        route.limits.told(),
     )
 
 
 def _repeats(question: Question, seen: Sequence[Seen], enough: float, most: int) -> int:
-    """Return the number of runs of a motion that reaches a worth of ``enough``, at most ``most``."""
-    tried = (r for r in range(_TWICE, most) if question.worth(seen, r) >= enough)
-    return next(tried, most)
+    """Return the number of runs of a motion that reaches a worth of ``enough``, at most ``most``.
+
+    The worth grows with the number of runs, so that the number is found by halving.
+    """
+    low, high = _TWICE, most
+    while low < high:
+        middle = (low + high) // 2
+        if question.worth(seen, middle) >= enough:
+            high = middle
+        else:
+            low = middle + 1
+    return low
 
 
 def _both(first: Runs, second: Runs) -> Runs:
@@ -147,31 +158,61 @@ def _seen(
     here = [k for k in which if all(r.possible[k] for r in runs)]
     together = [here] if here else []
     for group in [[k] for k in here] if alone else together:
+        compared: dict[int, _Compared] = {}
         # What a machine shows without the effects in question is the same for all rivals.
         shown: dict[tuple[int, tuple[Hypothesis, ...]], Array] = {}
         for place, (run, turn) in enumerate(zip(runs, turns, strict=True)):
-            fitter = route.fitter(run, group, alone=alone)
-            left, samples = _left(fitter, turn.other, turn.free, n_axes)
-            key = (id(turn.machine), turn.neither)
+            machine = id(turn.machine)
+            if machine not in compared:
+                compared[machine] = _Compared(route.fitter(run, group, alone=alone), n_axes)
+            left, samples = compared[machine].left(turn.other, turn.free)
+            key = (machine, turn.neither)
             if key not in shown:
                 same = turn.neither == turn.free
-                shown[key] = left if same else _left(fitter, turn.other, turn.neither, n_axes)[0]
+                shown[key] = left if same else compared[machine].left(turn.other, turn.neither)[0]
             for k, a, b, n in zip(group, left, shown[key], samples, strict=True):
                 out[k][place] = Seen(a, b, n)
     return out
 
 
-def _left(
-    fitter: ModelFitter, model: FittedModel, free: Sequence[Hypothesis], n_axes: int
-) -> tuple[Array, list[float]]:
-    """Return what a model with the effects ``free`` leaves of each run, as mean squares (n_runs, n_axes).
+class _Compared:
+    """Runs of one machine, to which models are fitted in one linear step.
 
-    The second value is the number of residuals of an axis in each run.
+    The first fit computes the sensitivities to the simulator's own parameters. Later ones reuse them, because rivals
+    hardly alter them. On an arm of six axes, they are most of the work.
     """
-    # Sensitivities along other logs cannot be reused.
-    start = replace(model, columns={})
-    values = model.robot_values
-    found = must_hold(fitter.fit(free, start, robot_values=values, max_iterations=0))
+
+    def __init__(self, fitter: ModelFitter, n_axes: int) -> None:
+        self._fitter, self._n_axes = fitter, n_axes
+        self._own: dict[tuple[str | None, str], Any] = {}
+
+    def left(self, model: FittedModel, free: Sequence[Hypothesis]) -> tuple[Array, list[float]]:
+        """Return what a model with the effects ``free`` leaves of each run, as mean squares (n_runs, n_axes).
+
+        The second value is the number of residuals of an axis in each run.
+        """
+        # Sensitivities along other logs cannot be reused.
+        start = replace(model, columns=self._own)
+        found = must_hold(
+            self._fitter.fit(
+                free,
+                start,
+                robot_values=model.robot_values,
+                lazy=bool(self._own),
+                max_iterations=0,
+            )
+        )
+        own = {
+            key: column
+            for key, column in found.columns.items()
+            if key[0] is None and not self._fitter.bends(key[1])
+        }
+        self._own = own | self._own
+        return _mean_squares(model, found, self._n_axes)
+
+
+def _mean_squares(model: FittedModel, found: FittedModel, n_axes: int) -> tuple[Array, list[float]]:
+    """Return what is left of runs after one linear step from ``found``, with what ``model`` knows as a prior."""
     known = model.matrix.sum(axis=0) + model.prior_matrix
     names = [p for p in found.parameters if p in model.parameters]
     mine = [found.parameters.index(p) for p in names]

@@ -43,13 +43,20 @@ def limits_of(limited: Any, ranges: Any) -> Array:
     return np.asarray(np.where(np.asarray(limited, dtype=bool), alike, np.inf))
 
 
+def ranges_of(limited: Any, ranges: Any) -> Array:
+    """Return ranges (n, 2), infinite if not limited."""
+    free = np.array([-np.inf, np.inf])
+    return np.where(np.asarray(limited, dtype=bool)[:, None], np.asarray(ranges, float), free)
+
+
 class Actuators:
     """The n actuators of a compiled model, with MuJoCo's numbers.
 
     Arrays are (n,): ``joint`` is the number of the joint, -1 without one. ``gear``, ``armature`` [kg m^2],
     ``damping`` [Nm s/rad] (before the gear), ``delay`` [s], ``lag`` [s] and ``gain`` are those of MuJoCo.
-    Limits are as from `limits_of`: ``command_limit`` of the first command, ``force_limit`` [Nm] before the
-    gear, and ``joint_limit`` (njnt,) [Nm] of all actuators of a joint together, after the gear.
+    ``command_range`` of the first command and ``force_range`` [Nm] before the gear are (n, 2), infinite if not
+    limited. Limits are as from `limits_of`: ``command_limit`` and ``force_limit`` of these ranges, and
+    ``joint_limit`` (njnt,) [Nm] of all actuators of a joint together, after the gear.
     """
 
     def __init__(self, model: Any) -> None:
@@ -83,14 +90,16 @@ class Actuators:
         self.offset = np.where(
             model.actuator_biastype == _AFFINE, model.actuator_biasprm[:, 0], 0.0
         )
+        self.command_range = np.tile([-np.inf, np.inf], (n, 1))
         self.command_limit = np.full(n, np.inf)
-        self.command_limit[has_command] = limits_of(
+        limited = (
             model.actuator_ctrllimited[command[has_command]],
             model.actuator_ctrlrange[command[has_command]],
         )
-        self.force_limit = limits_of(
-            model.actuator_forcelimited[output], model.actuator_forcerange[output]
-        )
+        self.command_range[has_command] = ranges_of(*limited)
+        self.command_limit[has_command] = limits_of(*limited)
+        forces = model.actuator_forcelimited[output], model.actuator_forcerange[output]
+        self.force_range, self.force_limit = ranges_of(*forces), limits_of(*forces)
         self.joint_limit = limits_of(model.jnt_actfrclimited, model.jnt_actfrcrange)
 
     def is_motor(self, i: int) -> bool:

@@ -12,6 +12,7 @@ import scipy
 from numpy.typing import NDArray
 
 from axisight.errors import MissingExtraError, RobotError
+from axisight.robot import JointLimits
 from axisight.robot_import.bodies import (
     Body,
     Drive,
@@ -25,6 +26,7 @@ from axisight.robot_import.bodies import (
 )
 from axisight.robot_import.mjcf.actuators import Actuators, numbers
 from axisight.robot_import.mjcf.gravity import Compensation, compensation
+from axisight.robot_import.mjcf.joint_limits import limits_of_joint
 from axisight.robot_import.mjcf.notes import notes_of
 from axisight.robot_import.mjcf.sensors import reading_delay_s
 from axisight.robot_import.outside import with_includes
@@ -199,7 +201,6 @@ class _Compiled:
             )
         else:
             drive = Drive()
-        limits = tuple(map(float, model.jnt_range[j])) if model.jnt_limited[j] else None
         # The arrow makes the name unique, as names in MuJoCo cannot contain it.
         return Body(
             f"{body}\N{RIGHTWARDS ARROW}{name}",
@@ -211,7 +212,7 @@ class _Compiled:
             None,
             where,
             drive,
-            limits,  # type: ignore[arg-type]
+            JointLimits() if motion == "other" else limits_of_joint(actuators, j),
             refused,
             bare=bare,
             of=body,

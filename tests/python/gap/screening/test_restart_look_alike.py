@@ -142,6 +142,11 @@ def test_what_feels_the_first_waits_for_the_next_round(monkeypatch):
     assert [s.axis for s in kept] == [0, 1, 2]
 
 
+def test_a_round_without_candidates_refines_nothing():
+    """Logs of one speed may leave no effect to try; a diagnosis of such logs must not break off."""
+    assert SearchRound._not_coupled(SimpleNamespace(current=None, layout=None), [], []) == []
+
+
 def test_a_clear_leader_is_refined_where_one_of_its_axis_leads_elsewhere(monkeypatch):
     elsewhere = led(2)
     monkeypatch.setitem(vars(TRIED[0].hypothesis), "effect", Effect("viscous_friction", 1))

@@ -12,6 +12,7 @@ from axisight.gap import ExperimentLimits
 from axisight.gap.separate.courses import Room, SumOfSines, centred, courses, improved, whole_travel
 from axisight.gap.separate.limits import Range, within_limits
 from axisight.gap.separate.waves import Motion
+from axisight.robot import JointLimits
 
 RANGE = Range(
     speed=np.array([2.0, 0.5]),
@@ -101,10 +102,71 @@ def test_stated_limits_take_the_place_of_seen_ones() -> None:
 def test_travel_ends_where_the_joint_does() -> None:
     """Closed form: the range of a joint over its gear ratio, from where the motor starts."""
     ratio = float(AXIS.gear_ratio[0])
-    robot = AXIS.as_imported(None, states_pose=True, joint_ranges=[(-0.1 * ratio, 0.4 * ratio)])
-    found = within_limits(ONE, None, robot, np.array([0.1]))
-    np.testing.assert_allclose(found.forth, [0.3])
-    np.testing.assert_allclose(found.back, [-0.2])
+    robot = AXIS.with_joint_limits([JointLimits((-0.1 * ratio, 0.4 * ratio))])
+    for given in (None, ExperimentLimits(travel_rad=9.0)):
+        found = within_limits(ONE, given, robot, np.array([0.1]))
+        np.testing.assert_allclose(found.forth, [0.3])
+        np.testing.assert_allclose(found.back, [-0.2])
+        assert found.sources["travel"] == ("model",)
+    found = within_limits(ONE, ExperimentLimits(travel_rad=0.05), robot, np.array([0.1]))
+    assert (found.back.tolist(), found.forth.tolist()) == ([-0.05], [0.05])
+    assert found.sources["travel"] == ("given",)
+
+
+# Three axes with gears of 1/200 and less; the logs reach one of everything, and the model states some limits.
+ARM = load_robot("irb6600_like")
+EACH = np.ones(3)
+REACHED = Range(EACH, -EACH, EACH, EACH, EACH)
+STATED = ARM.with_joint_limits(
+    [
+        JointLimits(velocity=0.02, effort=4000.0),
+        JointLimits(acceleration=3.0),
+        JointLimits(position=(-0.5, 0.25), velocity=0.04),
+    ]
+)
+
+
+def test_limits_of_the_model_come_before_what_the_logs_reach() -> None:
+    """Closed form: joint limits over the gear ratio, and torque times it."""
+    ratio = np.abs(ARM.gear_ratio)
+    found = within_limits(REACHED, None, STATED, np.zeros(3))
+    np.testing.assert_allclose(found.speed, [0.02 / ratio[0], 1.0, 0.04 / ratio[2]])
+    np.testing.assert_allclose(found.acceleration, [1.0, 3.0 / ratio[1], 1.0])
+    np.testing.assert_allclose(found.torque, [4000.0 * ratio[0], 1.0, 1.0])
+    ends = np.sort(np.array([-0.5, 0.25]) / ARM.gear_ratio[2])
+    np.testing.assert_allclose(found.back, [-1.0, -1.0, ends[0]])
+    np.testing.assert_allclose(found.forth, [1.0, 1.0, ends[1]])
+    assert found.sources == {
+        "speed": ("model", "logs", "model"),
+        "acceleration": ("logs", "model", "logs"),
+        "travel": ("logs", "logs", "model"),
+        "torque": ("model", "logs", "logs"),
+    }
+
+
+def test_limits_of_the_user_come_first() -> None:
+    given = ExperimentLimits(velocity_rad_s=9.0, torque_nm=[1.0, 2.0, 3.0])
+    found = within_limits(REACHED, given, STATED, np.zeros(3))
+    assert found.speed.tolist() == [9.0, 9.0, 9.0]
+    assert found.torque.tolist() == [1.0, 2.0, 3.0]
+    assert found.sources["speed"] == found.sources["torque"] == ("given",) * 3
+    assert found.sources["acceleration"] == ("logs", "model", "logs")
+
+
+def test_a_plan_says_where_its_limits_come_from() -> None:
+    given = ExperimentLimits(velocity_rad_s=9.0, torque_nm=[1.0, 2.0, 3.0])
+    limits = within_limits(replace(REACHED, acceleration=np.inf * EACH), given, STATED, np.zeros(3))
+    speed, acceleration, travel, torque = map(str, limits.told())
+    assert speed == "speed: 9 rad/s (as given)"
+    most = 3.0 / abs(ARM.gear_ratio[1])
+    assert acceleration == (
+        f"acceleration: axis 1, 3: no limit (logs); axis 2: {most:.3g} rad/s^2 (robot's model)"
+    )
+    ends = np.sort(np.array([-0.5, 0.25]) / ARM.gear_ratio[2])
+    assert travel == (
+        f"travel: axis 1, 2: 1 rad (logs); axis 3: {ends[0]:.3g} to {ends[1]:.3g} rad (robot's model)"
+    )
+    assert torque == "torque: 1, 2, 3 Nm (as given)"
 
 
 def test_a_run_must_stay_in_torque_and_room() -> None:
