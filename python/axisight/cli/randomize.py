@@ -12,11 +12,20 @@ from axisight.arguments import one_of
 from axisight.cli.common import Force, errors, say
 from axisight.cli.screen import OUT
 from axisight.errors import InputError
-from axisight.posterior import PROJECTS, Posterior, load_posterior, plot_corner, randomization
-from axisight.posterior.randomization import Randomization
+from axisight.posterior import (
+    PROJECTS,
+    Posterior,
+    Randomization,
+    load_posterior,
+    plot_corner,
+    randomization,
+    randomization_document,
+    save_randomization,
+)
 from axisight.storage import check_targets
 
-_REPLACED = {"--out": (".py",), "--plot": (".png", ".pdf", ".svg")}
+_DOCUMENTS = (".yaml", ".yml", ".json")
+_REPLACED = {"--out": (".py", *_DOCUMENTS), "--plot": (".png", ".pdf", ".svg")}
 
 
 def randomize_command(
@@ -28,7 +37,12 @@ def randomize_command(
         typer.Option("--for", metavar="NAME", help=f"Project: {', '.join(PROJECTS)}."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Python file to write. Needs --for.")
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            help="File to write: Python with --for; else ranges and joint draws for any simulator, .yaml or .json.",
+        ),
     ] = None,
     elastic_gears: Annotated[
         bool,
@@ -44,13 +58,12 @@ def randomize_command(
 ) -> None:
     """Turn the posterior of a diagnosis into ranges and joint draws for training.
 
-    Without --for: which parameters are known how well, which are correlated, which really vary between runs.
+    Without --for: which parameters are known how well, which are correlated, which really vary between runs. With
+    --out, a document for any simulator.
     """
     with errors():
-        if out is not None and project is None:
-            raise InputError(
-                f"--out: expected --for beside it, one of {', '.join(PROJECTS)}, got nothing"
-            )
+        if out is not None:
+            _check_ending(out, project)
         if project is not None:
             one_of("--for", project, PROJECTS)
         check_targets(
@@ -59,6 +72,9 @@ def randomize_command(
         found = load_posterior(posterior)
         if project is None:
             _show(found)
+            if out is not None:
+                made_for_any = randomization_document(found, elastic_gears=elastic_gears)
+                say(f"written: {save_randomization(made_for_any, out)}")
         else:
             made = randomization(found, project, elastic_gears=elastic_gears)
             _show_ranges(made)
@@ -67,6 +83,20 @@ def randomize_command(
         if plot is not None:
             plot_corner(found).savefig(plot, dpi=150)
             say(f"plot: {plot}")
+
+
+def _check_ending(out: Path, project: str | None) -> None:
+    """Raise InputError for a file whose name says something else than its content will be."""
+    document = out.suffix in _DOCUMENTS
+    if project is None and not document:
+        raise InputError(
+            f"--out: expected a name ending in {', '.join(_DOCUMENTS)}, or --for beside it, one of "
+            f"{', '.join(PROJECTS)}, got {out}"
+        )
+    if project is not None and document:
+        raise InputError(
+            f"--out: expected a Python file with --for, got {out}; without --for it is for any simulator"
+        )
 
 
 def _show(found: Posterior) -> None:

@@ -10,7 +10,12 @@ from typer.testing import CliRunner
 from axisight.cli import app
 from axisight.cli import outputs as module
 from axisight.errors import MissingExtraError
-from axisight.posterior import load_posterior, save_posterior
+from axisight.posterior import (
+    load_posterior,
+    load_randomization,
+    randomization_document,
+    save_posterior,
+)
 from gap_data import bare_axis, bare_case, log_of, reference, scattered
 from posterior_data import two_hypotheses
 
@@ -43,10 +48,23 @@ def test_with_a_project_it_writes_code_and_says_what_has_no_home(made, tmp_path)
     assert "gear_stiffness" in elastic and "no home: axis1.stiffness" not in elastic
 
 
+def test_a_document_for_any_simulator(made, tmp_path):
+    out = tmp_path / "ranges.yaml"
+    assert "written:" in run("randomize", made, "-o", out)
+    expected = randomization_document(load_posterior(made))
+    assert load_randomization(out) == expected
+    run("randomize", made, "--elastic-gears", "-o", out)
+    assert load_randomization(out).number("gear_stiffness of axis1").unit == "Nm/rad"
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["-o", "dr.py"], "--out: expected --for beside it"),
+        (
+            ["-o", "dr.py"],
+            "--out: expected a name ending in .yaml, .yml, .json, or --for beside it",
+        ),
+        (["--for", "mjlab", "-o", "dr.yaml"], "--out: expected a Python file with --for"),
         (
             ["--for", "mjlabs"],
             "--for: expected one of mjlab, playground, isaaclab, got 'mjlabs'. Did you mean",
