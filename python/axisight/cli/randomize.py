@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.table import Table
@@ -11,6 +11,7 @@ from rich.table import Table
 from axisight.arguments import one_of
 from axisight.cli.common import Force, errors, say
 from axisight.cli.screen import OUT
+from axisight.documents import parse_json, read_text
 from axisight.errors import InputError
 from axisight.posterior import (
     PROJECTS,
@@ -21,6 +22,7 @@ from axisight.posterior import (
     randomization,
     randomization_document,
     save_randomization,
+    with_repeats,
 )
 from axisight.storage import check_targets
 
@@ -51,6 +53,13 @@ def randomize_command(
             help="The model has two joints for each axis with an elastic gear, as axisight.to_mujoco writes it.",
         ),
     ] = False,
+    repeats: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="JSON",
+            help="Document of 'axisight repeat --json': what varies between runs and days comes from it.",
+        ),
+    ] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Corner plot to write: .png, .pdf or .svg.")
     ] = None,
@@ -66,10 +75,11 @@ def randomize_command(
             _check_ending(out, project)
         if project is not None:
             one_of("--for", project, PROJECTS)
-        check_targets(
-            {"--out": out, "--plot": plot}, inputs=[posterior], replaces=_REPLACED, force=force
-        )
+        read = [posterior] if repeats is None else [posterior, repeats]
+        check_targets({"--out": out, "--plot": plot}, inputs=read, replaces=_REPLACED, force=force)
         found = load_posterior(posterior)
+        if repeats is not None:
+            found = with_repeats(found, _document(repeats))
         if project is None:
             _show(found)
             if out is not None:
@@ -83,6 +93,19 @@ def randomize_command(
         if plot is not None:
             plot_corner(found).savefig(plot, dpi=150)
             say(f"plot: {plot}")
+
+
+def _document(path: Path) -> dict[str, Any]:
+    """Return the document of a comparison of days."""
+    try:
+        content = parse_json(read_text(path))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"--repeats: expected the JSON of 'axisight repeat --json': {error}"
+        ) from None
+    if not isinstance(content, dict):
+        raise InputError(f"--repeats: expected the JSON of 'axisight repeat --json', got {path}")
+    return content
 
 
 def _check_ending(out: Path, project: str | None) -> None:

@@ -15,6 +15,7 @@ from axisight.posterior.randomization import (
     randomization_document,
     save_randomization,
 )
+from axisight.posterior.repeated import with_repeats
 from axisight.posterior.result import Posterior, PosteriorHypothesis
 from axisight.posterior.sampled_robot import sampled_robot
 
@@ -38,4 +39,5 @@ __all__ = [
     "save_posterior",
     "save_randomization",
     "to_datatree",
+    "with_repeats",
 ]

@@ -15,13 +15,13 @@ from posterior_data import one_hypothesis
 
 pytest.importorskip("mujoco_playground")
 
-import jax  # noqa: E402
-import jax.numpy as jp  # noqa: E402
-from ml_collections import config_dict  # noqa: E402
-from mujoco import mjx  # noqa: E402
-from mujoco_playground import MjxEnv, State  # noqa: E402
-from mujoco_playground._src import mjx_env  # noqa: E402
-from mujoco_playground._src.wrapper import wrap_for_brax_training  # noqa: E402
+import jax
+import jax.numpy as jp
+from ml_collections import config_dict
+from mujoco import mjx
+from mujoco_playground import MjxEnv, State
+from mujoco_playground._src import mjx_env
+from mujoco_playground._src.wrapper import wrap_for_brax_training
 
 NUMBER = 8
 MODEL = """
