@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
@@ -16,7 +16,6 @@ from axisight.posterior.between_runs import BetweenRuns
 from axisight.posterior.parameter import PosteriorParameter, Simulated
 from axisight.posterior.result import Posterior
 from axisight.posterior.settings import FALSE_ALARMS
-from axisight.repeats import DayComparison
 from axisight.statistics.holm import holm
 
 _SCHEMA = "axisight.repeat/1"
@@ -24,7 +23,18 @@ _SCHEMA = "axisight.repeat/1"
 _SHARED = ("coulomb_friction", "torque_offset", "viscous_friction")
 
 
-def with_repeats(posterior: Posterior, comparison: DayComparison | Mapping[str, Any]) -> Posterior:
+class Comparison(Protocol):
+    """A comparison of days that gives its document: `axisight.repeats.DayComparison`.
+
+    The room of repeats builds on the diagnosis, which builds on this one, so it cannot be named here.
+    """
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the document for JSON."""
+        ...
+
+
+def with_repeats(posterior: Posterior, comparison: Comparison | Mapping[str, Any]) -> Posterior:
     """Return the posterior with the variation between runs and days that repeats of one motion show.
 
     Dry friction, viscous friction and constant torque take their `BetweenRuns` from the comparison; both are on the
@@ -42,8 +52,8 @@ def with_repeats(posterior: Posterior, comparison: DayComparison | Mapping[str, 
     parameter is one of the posterior.
     """
     known = instance("posterior", posterior, Posterior)
-    document = comparison.to_dict() if isinstance(comparison, DayComparison) else comparison
     try:
+        document = comparison if isinstance(comparison, Mapping) else comparison.to_dict()
         found = _found(known, document)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, InputError):
