@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -15,9 +16,12 @@ from axisight.posterior import (
     load_randomization,
     randomization_document,
     save_posterior,
+    with_repeats,
 )
+from axisight.repeats import compare_days
 from gap_data import bare_axis, bare_case, log_of, reference, scattered
 from posterior_data import two_hypotheses
+from repeat_data import runs
 
 
 def run(*arguments: str | Path, status: int = 0) -> str:
@@ -55,6 +59,17 @@ def test_a_document_for_any_simulator(made, tmp_path):
     assert load_randomization(out) == expected
     run("randomize", made, "--elastic-gears", "-o", out)
     assert load_randomization(out).number("gear_stiffness of axis1").unit == "Nm/rad"
+
+
+def test_what_varies_between_runs_comes_from_repeats(made, tmp_path):
+    comparison = compare_days(*runs(2, 20, scatter=0.05), torque_held=False)
+    (tmp_path / "repeat.json").write_text(json.dumps(comparison.to_dict()))
+    run("randomize", made, "--repeats", tmp_path / "repeat.json", "-o", tmp_path / "ranges.yaml")
+    found = load_randomization(tmp_path / "ranges.yaml")
+    assert found == randomization_document(with_repeats(load_posterior(made), comparison))
+    (tmp_path / "no.json").write_text("[]")
+    said = run("randomize", made, "--repeats", tmp_path / "no.json", status=2)
+    assert "--repeats: expected the JSON of 'axisight repeat --json'" in said
 
 
 @pytest.mark.parametrize(

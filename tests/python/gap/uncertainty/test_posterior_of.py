@@ -170,6 +170,8 @@ def test_friction_that_differs_from_run_to_run_varies():
     assert varies == [COULOMB]
     # The four values have the standard deviation 0.091; the error of formulas is taken off.
     assert found.variation(COULOMB).std == pytest.approx(0.091, rel=0.3)
+    # The validation logs are other runs, with friction amid that of the estimation logs.
+    assert all(log.attrs["inside"] > 0.93 for log in found.held_out)
     wider = found.gaussian(between_runs=True).deviation.sel(parameter=COULOMB)
     assert float(wider) > float(found.gaussian().deviation.sel(parameter=COULOMB))
 
