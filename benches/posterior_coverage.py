@@ -1,6 +1,8 @@
 """How often the posterior of a diagnosis holds what it says, on simulated machines with short logs.
 
-    python benches/posterior_coverage.py [MACHINES] [SECONDS]
+    python benches/posterior_coverage.py [MACHINES] [SECONDS] [--parameters]
+
+``--parameters``: only the band of held-out torque, and the true parameters inside their intervals.
 
 One elastic axis. Machines differ by about 1 % in every parameter, and have dry friction (every third one also a ripple)
 that the simulator lacks. Four estimation logs and two validation logs each. Printed:
@@ -134,8 +136,10 @@ def share(values: list[bool] | list[float]) -> str:
 
 def main() -> None:
     """Print the table of machines, then the sums."""
-    machines = int(sys.argv[1]) if len(sys.argv) > 1 else 32
-    seconds = float(sys.argv[2]) if len(sys.argv) > 2 else 4.0
+    given = [x for x in sys.argv[1:] if x != "--parameters"]
+    brief = len(given) < len(sys.argv) - 1
+    machines = int(given[0]) if given else 32
+    seconds = float(given[1]) if len(given) > 1 else 4.0
     inside: list[float] = []
     blocks: dict[bool, list[float]] = {True: [], False: []}
     held: dict[bool, dict[str, list[bool]]] = {True: {}, False: {}}
@@ -148,7 +152,8 @@ def main() -> None:
         mine = [log.attrs["inside"] for log in posterior.held_out]
         inside += mine
         for formula in (True, False):
-            blocks[formula] += blocks_inside(posterior, logs, formula_error=formula)
+            if not brief:
+                blocks[formula] += blocks_inside(posterior, logs, formula_error=formula)
             known = posterior.gaussian(formula_error=formula)
             for k, name in enumerate(posterior.best.names):
                 if name in truth:
@@ -166,7 +171,7 @@ def main() -> None:
             f"{', '.join(varies) or 'nothing'} |",
             flush=True,
         )
-        if number < machines // 2:
+        if number < machines // 2 and not brief:
             other = diagnosed(number, seconds, 0.1)[0].posterior
             assert other is not None
             known_run = other.variation(COULOMB)
@@ -178,9 +183,10 @@ def main() -> None:
     print(f"least {share([min(inside)])}, most {share([max(inside)])}")
     for formula in (True, False):
         with_or = "with" if formula else "without"
-        print(
-            f"means over {BLOCK_S} s inside, {with_or} the error of formulas: {share(blocks[formula])}"
-        )
+        if blocks[formula]:
+            print(
+                f"means over {BLOCK_S} s inside, {with_or} the error of formulas: {share(blocks[formula])}"
+            )
         every = [ok for one in held[formula].values() for ok in one]
         print(
             f"true parameters inside, {with_or} the error of formulas: {share(every)} of {len(every)}"
@@ -190,7 +196,10 @@ def main() -> None:
     quantiles = ", ".join(f"{x:.2f}" for x in np.quantile(ratios, [0.05, 0.5, 0.95]))
     print(f"bootstrap over Gaussian, 5 %, 50 % and 95 % quantile: {quantiles}")
     print(f"machines with a false alarm of variation between runs: {share(alarms)}")
-    print(f"friction that differs by 10 % from run to run is found: {share(power)} of {len(power)}")
+    if power:
+        print(
+            f"friction that differs by 10 % from run to run is found: {share(power)} of {len(power)}"
+        )
 
 
 if __name__ == "__main__":

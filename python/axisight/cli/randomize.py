@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.table import Table
@@ -11,12 +11,23 @@ from rich.table import Table
 from axisight.arguments import one_of
 from axisight.cli.common import Force, errors, say
 from axisight.cli.screen import OUT
+from axisight.documents import parse_json, read_text
 from axisight.errors import InputError
-from axisight.posterior import PROJECTS, Posterior, load_posterior, plot_corner, randomization
-from axisight.posterior.randomization import Randomization
+from axisight.posterior import (
+    PROJECTS,
+    Posterior,
+    Randomization,
+    load_posterior,
+    plot_corner,
+    randomization,
+    randomization_document,
+    save_randomization,
+    with_repeats,
+)
 from axisight.storage import check_targets
 
-_REPLACED = {"--out": (".py",), "--plot": (".png", ".pdf", ".svg")}
+_DOCUMENTS = (".yaml", ".yml", ".json")
+_REPLACED = {"--out": (".py", *_DOCUMENTS), "--plot": (".png", ".pdf", ".svg")}
 
 
 def randomize_command(
@@ -28,7 +39,12 @@ def randomize_command(
         typer.Option("--for", metavar="NAME", help=f"Project: {', '.join(PROJECTS)}."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Python file to write. Needs --for.")
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            help="File to write: Python with --for; else ranges and joint draws for any simulator, .yaml or .json.",
+        ),
     ] = None,
     elastic_gears: Annotated[
         bool,
@@ -37,6 +53,13 @@ def randomize_command(
             help="The model has two joints for each axis with an elastic gear, as axisight.to_mujoco writes it.",
         ),
     ] = False,
+    repeats: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="JSON",
+            help="Document of 'axisight repeat --json': what varies between runs and days comes from it.",
+        ),
+    ] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Corner plot to write: .png, .pdf or .svg.")
     ] = None,
@@ -44,21 +67,24 @@ def randomize_command(
 ) -> None:
     """Turn the posterior of a diagnosis into ranges and joint draws for training.
 
-    Without --for: which parameters are known how well, which are correlated, which really vary between runs.
+    Without --for: which parameters are known how well, which are correlated, which really vary between runs. With
+    --out, a document for any simulator.
     """
     with errors():
-        if out is not None and project is None:
-            raise InputError(
-                f"--out: expected --for beside it, one of {', '.join(PROJECTS)}, got nothing"
-            )
+        if out is not None:
+            _check_ending(out, project)
         if project is not None:
             one_of("--for", project, PROJECTS)
-        check_targets(
-            {"--out": out, "--plot": plot}, inputs=[posterior], replaces=_REPLACED, force=force
-        )
+        read = [posterior] if repeats is None else [posterior, repeats]
+        check_targets({"--out": out, "--plot": plot}, inputs=read, replaces=_REPLACED, force=force)
         found = load_posterior(posterior)
+        if repeats is not None:
+            found = with_repeats(found, _document(repeats))
         if project is None:
             _show(found)
+            if out is not None:
+                made_for_any = randomization_document(found, elastic_gears=elastic_gears)
+                say(f"written: {save_randomization(made_for_any, out)}")
         else:
             made = randomization(found, project, elastic_gears=elastic_gears)
             _show_ranges(made)
@@ -67,6 +93,33 @@ def randomize_command(
         if plot is not None:
             plot_corner(found).savefig(plot, dpi=150)
             say(f"plot: {plot}")
+
+
+def _document(path: Path) -> dict[str, Any]:
+    """Return the document of a comparison of days."""
+    try:
+        content = parse_json(read_text(path))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"--repeats: expected the JSON of 'axisight repeat --json': {error}"
+        ) from None
+    if not isinstance(content, dict):
+        raise InputError(f"--repeats: expected the JSON of 'axisight repeat --json', got {path}")
+    return content
+
+
+def _check_ending(out: Path, project: str | None) -> None:
+    """Raise InputError for a file whose name says something else than its content will be."""
+    document = out.suffix in _DOCUMENTS
+    if project is None and not document:
+        raise InputError(
+            f"--out: expected a name ending in {', '.join(_DOCUMENTS)}, or --for beside it, one of "
+            f"{', '.join(PROJECTS)}, got {out}"
+        )
+    if project is not None and document:
+        raise InputError(
+            f"--out: expected a Python file with --for, got {out}; without --for it is for any simulator"
+        )
 
 
 def _show(found: Posterior) -> None:

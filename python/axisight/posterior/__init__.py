@@ -8,9 +8,14 @@ from axisight.posterior.parameter import DrivenAxis, PosteriorParameter
 from axisight.posterior.randomization import (
     PROJECTS,
     Randomization,
+    RandomizationDocument,
     RandomizedField,
+    load_randomization,
     randomization,
+    randomization_document,
+    save_randomization,
 )
+from axisight.posterior.repeated import with_repeats
 from axisight.posterior.result import Posterior, PosteriorHypothesis
 from axisight.posterior.sampled_robot import sampled_robot
 
@@ -22,12 +27,17 @@ __all__ = [
     "PosteriorHypothesis",
     "PosteriorParameter",
     "Randomization",
+    "RandomizationDocument",
     "RandomizedField",
     "from_datatree",
     "load_posterior",
+    "load_randomization",
     "plot_corner",
     "randomization",
+    "randomization_document",
     "sampled_robot",
     "save_posterior",
+    "save_randomization",
     "to_datatree",
+    "with_repeats",
 ]

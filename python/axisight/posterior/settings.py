@@ -32,3 +32,9 @@ MOST_RIVALS = 5
 
 LEAST_ODDS = 0.02
 """Least weight of a rival that stays open, relative to the cause [1]."""
+
+STEP_LEFT = 0.1
+"""Largest distance from the optimum, in standard errors, at which the fit of a posterior ends.
+
+It takes 0.1 % from the coverage of a 95 % interval.
+"""

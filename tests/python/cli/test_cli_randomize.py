@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,17 @@ from typer.testing import CliRunner
 from axisight.cli import app
 from axisight.cli import outputs as module
 from axisight.errors import MissingExtraError
-from axisight.posterior import load_posterior, save_posterior
+from axisight.posterior import (
+    load_posterior,
+    load_randomization,
+    randomization_document,
+    save_posterior,
+    with_repeats,
+)
+from axisight.repeats import compare_days
 from gap_data import bare_axis, bare_case, log_of, reference, scattered
 from posterior_data import two_hypotheses
+from repeat_data import runs
 
 
 def run(*arguments: str | Path, status: int = 0) -> str:
@@ -43,10 +52,34 @@ def test_with_a_project_it_writes_code_and_says_what_has_no_home(made, tmp_path)
     assert "gear_stiffness" in elastic and "no home: axis1.stiffness" not in elastic
 
 
+def test_a_document_for_any_simulator(made, tmp_path):
+    out = tmp_path / "ranges.yaml"
+    assert "written:" in run("randomize", made, "-o", out)
+    expected = randomization_document(load_posterior(made))
+    assert load_randomization(out) == expected
+    run("randomize", made, "--elastic-gears", "-o", out)
+    assert load_randomization(out).number("gear_stiffness of axis1").unit == "Nm/rad"
+
+
+def test_what_varies_between_runs_comes_from_repeats(made, tmp_path):
+    comparison = compare_days(*runs(2, 20, scatter=0.05), torque_held=False)
+    (tmp_path / "repeat.json").write_text(json.dumps(comparison.to_dict()))
+    run("randomize", made, "--repeats", tmp_path / "repeat.json", "-o", tmp_path / "ranges.yaml")
+    found = load_randomization(tmp_path / "ranges.yaml")
+    assert found == randomization_document(with_repeats(load_posterior(made), comparison))
+    (tmp_path / "no.json").write_text("[]")
+    said = run("randomize", made, "--repeats", tmp_path / "no.json", status=2)
+    assert "--repeats: expected the JSON of 'axisight repeat --json'" in said
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["-o", "dr.py"], "--out: expected --for beside it"),
+        (
+            ["-o", "dr.py"],
+            "--out: expected a name ending in .yaml, .yml, .json, or --for beside it",
+        ),
+        (["--for", "mjlab", "-o", "dr.yaml"], "--out: expected a Python file with --for"),
         (
             ["--for", "mjlabs"],
             "--for: expected one of mjlab, playground, isaaclab, got 'mjlabs'. Did you mean",

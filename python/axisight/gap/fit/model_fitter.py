@@ -60,6 +60,7 @@ class ModelFitter(ABC):
     """
 
     adds_up = False
+    step_tolerance = 1e-4
     silent: tuple[int, ...] = ()
 
     def __init__(
@@ -392,7 +393,7 @@ class ModelFitter(ABC):
         return FitOptions(
             max_iterations=max_iterations,
             loss_tolerance=tolerance,
-            step_tolerance=1e-4,
+            step_tolerance=self.step_tolerance,
             nuisance_refreshes=refreshes,
         )
 

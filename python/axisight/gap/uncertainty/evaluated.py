@@ -1,4 +1,4 @@
-"""The model of a verdict with fresh sensitivities at its final values."""
+"""The model of a verdict, fitted on to the optimum, with fresh sensitivities there."""
 
 from __future__ import annotations
 
@@ -11,6 +11,11 @@ from axisight.gap.fit.fitted_model import FittedModel
 from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.work_count import WorkCount
 from axisight.gap.search.balanced_values import inflation
+from axisight.gap.uncertainty.covariance import inverse, sandwich
+from axisight.posterior.settings import STEP_LEFT
+
+# Step, relative to the scale of each parameter, below which rounding decides. The fall of the loss ends a fit earlier.
+_SMALLEST_STEP = 1e-8
 
 
 def own_fitter(fitter: ModelFitter, model: FittedModel) -> ModelFitter:
@@ -27,9 +32,37 @@ def own_fitter(fitter: ModelFitter, model: FittedModel) -> ModelFitter:
 
 
 def evaluated(fitter: ModelFitter, model: FittedModel) -> FittedModel:
-    """Return a model with normal equations at its final values; as it is if it cannot be simulated there.
+    """Return a model with fresh normal equations at its optimum; as it is if it cannot be simulated.
+
+    The fits of a diagnosis end once the loss falls by less than 1e-4 of itself. Where the scatter of estimates is far
+    below what the weights say, the step that is left then exceeds a standard error. So the fit goes on, from the values
+    of the verdict, until at most `STEP_LEFT` standard errors are left (`least_fall`). If it does not get there, the
+    values stay those of the verdict.
 
     ``fitter``: that of `own_fitter`.
     """
-    found = fitter.fit(model.free, model, fresh=True, max_iterations=0)
-    return model if isinstance(found, Diverged) else found
+    here = fitter.fit(model.free, model, fresh=True, max_iterations=0)
+    if isinstance(here, Diverged):
+        return model
+    if not here.parameters:
+        return here
+    precise = copy(fitter)
+    precise.step_tolerance = _SMALLEST_STEP
+    there = precise.fit(here.free, here, fresh=True, worth=least_fall(here))
+    if isinstance(there, Diverged) or not (there.converged or there.stuck):
+        return here
+    found = fitter.fit(there.free, there, fresh=True, max_iterations=0)
+    return here if isinstance(found, Diverged) else found
+
+
+def least_fall(at: FittedModel) -> float:
+    """Return the fall of the loss below which no parameter is `STEP_LEFT` standard errors from the optimum.
+
+    A step d with the predicted fall f = d' H d obeys d_i^2 <= (H^-1)_ii f (Cauchy-Schwarz). So f is `STEP_LEFT`
+    squared, times the least ratio of the variance of an estimate (sandwich) to (H^-1)_ii.
+    """
+    told, scatter = np.diag(inverse(at)), np.diag(sandwich(at))
+    ratio = np.divide(scatter, told, out=np.full(len(told), np.inf), where=told > 0)
+    # A gradient that is zero in every block, as in exact simulations, has no scatter: rounding is the limit.
+    ratio = ratio[(ratio > 0) & np.isfinite(ratio)]
+    return float(STEP_LEFT**2 * ratio.min(initial=1.0))

@@ -75,7 +75,7 @@ def posterior_of(
         seed=view.settings.seed,
         version=version("axisight"),
     )
-    fitted = Variant(leading.robot_values, hypotheses[0].effects)
+    fitted = Variant(at.robot_values, hypotheses[0].effects)
     return replace(out, held_out=held_out_torque(view, held_logs, out, state.noise, fitted))
 
 
@@ -117,7 +117,7 @@ class _Parts:
     ) -> PosteriorHypothesis:
         """Return the Gaussian of one model, and add its parameters to those that are ``known``.
 
-        ``at``: the model with fresh normal equations.
+        ``at``: the model at its optimum, with fresh normal equations. Standard errors are those of the model.
         """
         own = {p.name: p for p in view.fitter.own}
         kept = [
@@ -132,11 +132,11 @@ class _Parts:
             else:
                 listed.append(cause_parameter(view.robot, model.free[place], name))
         std = standard_errors(model, listed)
-        mean = np.array([_value(model, key) for key in model.parameters])
+        mean = np.array([_value(at, key) for key in model.parameters])
         more = formula_std(view.fitter, model, std)
         known |= {p.name: p for p in (listed[i] for i in kept) if p.name not in known}
         return PosteriorHypothesis(
-            effects=(*self.shown, *(e for e in model.effects if e.label not in self.replaced)),
+            effects=(*self.shown, *(e for e in at.effects if e.label not in self.replaced)),
             weight=weight,
             names=tuple(listed[i].name for i in kept),
             mean=mean[kept],

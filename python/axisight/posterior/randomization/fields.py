@@ -100,7 +100,7 @@ def fields_of(posterior: Posterior, numbers: list[Number], *, no_range: Collecti
         ]
         together = bool(strong) or len(weights) > 1 or number.kind in no_range
         reach = NORMAL_DEVIATIONS * float(std[i])
-        low, high = _bounds(posterior, number)
+        low, high = bounds_of(posterior, number)
         every.append(
             RandomizedField(
                 number.kind,
@@ -139,13 +139,14 @@ def _moments(posterior: Posterior, numbers: list[Number], place: int) -> tuple[A
     return mean, np.asarray(slopes @ covariance @ slopes.T)
 
 
-def _bounds(posterior: Posterior, number: Number) -> tuple[float, float]:
-    """Return the values that a number may have: those of its parameters, and none below zero."""
+def bounds_of(posterior: Posterior, number: Number) -> tuple[float, float]:
+    """Return the values that a number may have: those of its parameters; numbers of engines are not below zero."""
     ends = np.full(2, number.constant)
     for name, slope in number.terms.items():
         p = posterior.parameter(name)
         ends += np.sort([slope * p.lower, slope * p.upper])
-    return max(0.0, float(ends[0])), float(ends[1])
+    least = -np.inf if number.kind == "own" else 0.0
+    return max(least, float(ends[0])), float(ends[1])
 
 
 def _varies(posterior: Posterior, number: Number) -> str:

@@ -34,7 +34,9 @@ Kind = Literal[
     "kd",
     "torque",
     "force_limit",
+    "own",
 ]
+"""Kinds of numbers. ``own``: a parameter of the posterior that rigid-body engines have no number for."""
 
 UNITS: Mapping[Kind, tuple[str, str]] = {
     "armature": ("kg m^2", "kg"),
@@ -49,6 +51,7 @@ UNITS: Mapping[Kind, tuple[str, str]] = {
     "kd": ("1", "1"),
     "torque": ("1", "1"),
     "force_limit": ("Nm", "N"),
+    "own": ("1", "1"),
 }
 """Units on the joint side: of a joint that turns, of one that slides. ``1``: a factor on the nominal value."""
 
@@ -68,18 +71,22 @@ _NOT_PD = "the gains of this controller are no gains of a servo with stiffness a
 
 @dataclass
 class Number:
-    """A number of an engine, on the joint side: ``constant`` plus the sum of coefficients times parameters."""
+    """A number of an engine, on the joint side: ``constant`` plus the sum of coefficients times parameters.
+
+    ``stated_unit``: unit of a number of the kind ``own``.
+    """
 
     kind: Kind
     joint: str
     sliding: bool
     constant: float = 0.0
     terms: dict[str, float] = field(default_factory=dict)
+    stated_unit: str = ""
 
     @property
     def unit(self) -> str:
         """Unit on the joint side; ``1`` for a factor."""
-        return UNITS[self.kind][int(self.sliding)]
+        return self.stated_unit or UNITS[self.kind][int(self.sliding)]
 
 
 @dataclass

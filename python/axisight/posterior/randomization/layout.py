@@ -69,21 +69,27 @@ class Layout:
         said = [f"{' + '.join(h.causes) or 'no cause'} ({h.weight:.2f})" for h in rivals]
         return [f"The verdict leaves these open, and every draw takes one: {'; '.join(said)}.", ""]
 
-    def names(self) -> str:
-        """Return the dictionaries of names that users adapt to their model."""
+    def names(self, *, actuators_by_joint: bool = False) -> str:
+        """Return the dictionaries of names that users adapt to their model.
+
+        ``actuators_by_joint``: actuators are named by the joint that they drive.
+        """
+        drive = "motor of {}" if self.elastic else "{}"
         tables = {
-            "DRIVES": (ON_DRIVE, "motor of {}" if self.elastic else "{}", "driven joints"),
+            "DRIVES": (ON_DRIVE, drive, "driven joints"),
             "GEARS": (ON_GEAR, "{}", "joints with a spring"),
             "BODIES": (ON_BODY, "link of {}", "bodies, by the joint that moves them"),
             "ACTUATORS": (ON_ACTUATOR, "{}", "actuators, by their joint"),
         }
+        if actuators_by_joint:
+            tables["ACTUATORS"] = (ON_ACTUATOR, drive, "joints that actuators drive")
         rigid = {a.joint for a in self.posterior.simulated.axes if not a.elastic}
         out = ["# Names in your model, as axisight.to_mujoco writes them: change the right side.\n"]
         for table, (kinds, pattern, words) in tables.items():
             joints = dict.fromkeys(f.joint for f in self.fields.every if f.kind in kinds)
             if joints:
                 rows = {
-                    j: (j if j in rigid and table == "DRIVES" else pattern.format(j))
+                    j: (j if j in rigid and table != "BODIES" else pattern.format(j))
                     for j in joints
                 }
                 out.append(f"{table} = {{  # {words}\n{_entries(rows)}}}\n")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from axisight.posterior.randomization.fields import RandomizedField
 from axisight.posterior.randomization.layout import (
+    ON_ACTUATOR,
     ON_BODY,
     ON_DRIVE,
     Layout,
@@ -33,7 +34,7 @@ _MODEL_FIELDS = {
     "kp": ("actuator_gainprm", "actuator_biasprm"),
     "kd": ("actuator_gainprm", "actuator_biasprm"),
     "torque": ("actuator_gainprm", "actuator_biasprm"),
-    "force_limit": ("actuator_forcerange",),
+    "force_limit": ("actuator_forcerange", "jnt_actfrcrange"),
 }
 
 _IMPORTS = """
@@ -87,21 +88,46 @@ _BODIES = """    for kind, field in (("mass", "body_mass"), ("inertia", "body_in
             factor = values[kind, joint].reshape(-1, *[1] * nominal.ndim)
             getattr(model, field)[worlds, place] = nominal * factor
 """
-_SERVOS = """    one = torch.ones(len(worlds), device=env.device)
+_ACTUATOR = '''
+
+def servo(asset, joint):
+    """Return the actuator that drives a joint, and the place of the joint among those that it drives."""
+    name = ACTUATORS[joint]
+    for actuator in asset.actuators:
+        if name in actuator.target_names:
+            return actuator, actuator.target_names.index(name)
+    raise ValueError(f"ACTUATORS: expected a joint with an actuator, got {name!r}")
+
+'''
+_SERVOS = """    one, ids = torch.ones(len(worlds), device=env.device), worlds[:, 0]
     for joint in dict.fromkeys(j for k, j in values if k in ("kp", "kd", "torque")):
-        found, _ = asset.find_actuators(re.escape(ACTUATORS[joint]))
-        place = asset.indexing.ctrl_ids[found]
-        kp, kd, torque = (values.get((k, joint), one)[:, None] for k in ("kp", "kd", "torque"))
-        gain, bias = default("actuator_gainprm")[place], default("actuator_biasprm")[place]
-        model.actuator_gainprm[worlds, place, 0] = gain[:, 0] * kp * torque
-        model.actuator_biasprm[worlds, place, 1] = bias[:, 1] * kp * torque
-        model.actuator_biasprm[worlds, place, 2] = bias[:, 2] * kd * torque
+        actuator, place = servo(asset, joint)
+        kp, kd, torque = (values.get((k, joint), one) for k in ("kp", "kd", "torque"))
+        outside = hasattr(actuator, "default_stiffness")
+        if outside:  # mjlab computes the servo, and the model has a motor.
+            actuator.stiffness[ids, place] = actuator.default_stiffness[ids, place] * kp
+            actuator.damping[ids, place] = actuator.default_damping[ids, place] * kd
+        # A joint with two actuators has the gain on the speed in the second one.
+        for number, at in enumerate(actuator.global_ctrl_ids[place :: len(actuator.target_names)]):
+            gain, bias = default("actuator_gainprm")[at], default("actuator_biasprm")[at]
+            own = one if outside else kp if number == 0 else kd
+            model.actuator_gainprm[ids, at, 0] = gain[0] * own * torque
+            model.actuator_biasprm[ids, at, 1] = bias[1] * kp * torque
+            model.actuator_biasprm[ids, at, 2] = bias[2] * kd * torque
 """
 _LIMITS = """    for joint in (j for k, j in values if k == "force_limit"):
-        found, _ = asset.find_actuators(re.escape(ACTUATORS[joint]))
-        place = asset.indexing.ctrl_ids[found]
-        model.actuator_forcerange[worlds, place, 0] = -values["force_limit", joint][:, None]
-        model.actuator_forcerange[worlds, place, 1] = values["force_limit", joint][:, None]
+        actuator, place = servo(asset, joint)
+        limit, ids = values["force_limit", joint], worlds[:, 0]
+        if hasattr(actuator, "default_force_limit"):
+            actuator.force_limit[ids, place] = limit
+            continue
+        # The limit of a joint with two actuators stands in the joint.
+        double = len(actuator.global_ctrl_ids) > len(actuator.target_names)
+        field = model.jnt_actfrcrange if double else model.actuator_forcerange
+        joints = asset.indexing.joint_ids[actuator.target_ids]
+        at = joints[place] if double else actuator.global_ctrl_ids[place]
+        field[ids, at, 0] = -limit
+        field[ids, at, 1] = limit
 """
 
 
@@ -113,7 +139,7 @@ def mjlab(layout: Layout) -> str:
         ranges="from mjlab.envs.mdp import dr\n" if layout.fields.alone else "",
         more=", RecomputeLevel, requires_model_fields" if used else "",
     )
-    parts = [layout.head(), imports, layout.names(), "\n", layout.together()]
+    parts = [layout.head(), imports, layout.names(actuators_by_joint=True), "\n", layout.together()]
     if used:
         parts += [_DRAW, _writer(used)]
     return "".join([*parts, "\n\n", _events(layout)])
@@ -127,7 +153,8 @@ def _writer(used: list[RandomizedField]) -> str:
         level = "set_const_0"
     if kinds.keys() & set(ON_BODY):
         level = "set_const"
-    out = [_WRITER.format(fields=", ".join(f'"{name}"' for name in fields), level=level)]
+    out = [_ACTUATOR] if kinds.keys() & set(ON_ACTUATOR) else []
+    out.append(_WRITER.format(fields=", ".join(f'"{name}"' for name in fields), level=level))
     table = {"gear_damping": "GEARS"} | dict.fromkeys(ON_DRIVE, "DRIVES")
     rows = [
         f'("{kind}", "{_MODEL_FIELDS[kind][0]}", {table[kind]})' for kind in kinds if kind in table
