@@ -199,5 +199,5 @@ def _compared(
     if machine.remainder is None:
         return inputs, view
     logs = [*inputs.estimation, *inputs.validation]
-    inputs = inputs.with_torques(without_stated(logs, machine.remainder, view, settings))
+    inputs = inputs.without_remainder(without_stated(logs, machine.remainder, view, settings))
     return inputs, inputs.view(settings)

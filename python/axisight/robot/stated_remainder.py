@@ -38,6 +38,15 @@ def stated_remainder(text: str, n_axes: int) -> Remainder | None:
     return found
 
 
+def refuse_remainder(remainder: Remainder | None, what: str) -> None:
+    """Raise InputError for a robot with a remainder, which ``what`` cannot take into account."""
+    if remainder is not None:
+        raise InputError(
+            f"robot: expected one without a remainder for {what}, got one of {len(remainder.terms)} terms; "
+            "robot.with_remainder(None) is without it"
+        )
+
+
 def described_with_remainder(text: str, remainder: Remainder | None, n_axes: int) -> str:
     """Return the text of a robot file with a remainder in place of its own; None removes it.
 

@@ -111,10 +111,10 @@ class PreparedLogs:
             simulator=found,
         )
 
-    def with_torques(self, logs: Sequence[Log]) -> PreparedLogs:
-        """Return the same with other torques in the estimation logs and then the validation logs."""
-        n = len(self.estimation)
-        return replace(self, estimation=list(logs[:n]), validation=list(logs[n:]))
+    def without_remainder(self, logs: Sequence[Log]) -> PreparedLogs:
+        """Return the same with estimation and then validation ``logs`` without the robot's remainder."""
+        n, robot = len(self.estimation), self.robot.with_remainder(None)
+        return replace(self, robot=robot, estimation=list(logs[:n]), validation=list(logs[n:]))
 
     def compared_later(self, view: View, baseline: FittedModel, settings: Settings) -> PreparedLogs:
         """Return the same with logs that are compared later where the machine begins elsewhere than the simulation.
