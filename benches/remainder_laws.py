@@ -213,9 +213,11 @@ def rigid_robot() -> Robot:
 AMPLITUDE = np.array([0.8, 0.5, 0.6])
 
 
-def sums_of_sines(rng: np.random.Generator) -> Array:
+def sums_of_sines(
+    rng: np.random.Generator, rate_hz: float = RATE_HZ, run_s: float = RUN_S
+) -> Array:
     """Return joint angles (n, 3) [rad] of five harmonics."""
-    t = np.arange(int(RUN_S * RATE_HZ)) / RATE_HZ
+    t = np.arange(int(run_s * rate_hz)) / rate_hz
     out = np.zeros((len(t), 3))
     for axis in range(3):
         for k in range(1, 6):
@@ -224,14 +226,16 @@ def sums_of_sines(rng: np.random.Generator) -> Array:
     return np.asarray(AMPLITUDE * out / np.abs(out).max(axis=0))
 
 
-def point_to_point(rng: np.random.Generator) -> Array:
+def point_to_point(
+    rng: np.random.Generator, rate_hz: float = RATE_HZ, run_s: float = RUN_S
+) -> Array:
     """Return joint angles (n, 3) [rad] of moves between random points: polynomials of the fifth degree, and rests."""
-    n = int(RUN_S * RATE_HZ)
+    n = int(run_s * rate_hz)
     out = np.zeros((n, 3))
     for axis in range(3):
         at, now, points = 0, rng.uniform(-0.8, 0.8), []
         while at < n:
-            rest, move = int(RATE_HZ * rng.uniform(0.2, 0.6)), int(RATE_HZ * rng.uniform(1.2, 2.4))
+            rest, move = int(rate_hz * rng.uniform(0.2, 0.6)), int(rate_hz * rng.uniform(1.2, 2.4))
             to = float(np.clip(now + rng.choice([-1, 1]) * rng.uniform(0.3, 1.0), -0.9, 0.9))
             s = np.arange(move) / move
             path = now + (to - now) * s**3 * (10 - 15 * s + 6 * s**2)

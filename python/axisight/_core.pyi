@@ -11,7 +11,7 @@ the interpreter lock and raise KeyboardInterrupt on Ctrl-C. After `CancelToken.c
 simulation returns early with status "cancelled" and a fit raises KeyboardInterrupt.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, NotRequired, Protocol, TypeAlias, TypedDict, final, type_check_only
 
 import numpy as np
@@ -813,6 +813,7 @@ def simulate_batch(
     model: _Model | str = "nonlinear",
     resolution: float = 0.0,
     threads: int = 0,
+    beside: Callable[[float, _Array, _Array, _Array, _Array], _Array] | None = None,
     cancel: CancelToken | None = None,
 ) -> BatchOutput:
     """Simulate runs from rest.
@@ -821,7 +822,9 @@ def simulate_batch(
     controller if ``reference``, else commanded torques [Nm]. ``noise`` [rad], of the same
     shape, is added to the measured position. ``start`` (1 or n_runs, n_axes) [rad] are the driven joint
     angles at rest, None the operating point. ``resolution`` [rad] is the step of the position
-    sensor, 0 for none. ``threads`` 0 takes every core; results do not depend on it.
+    sensor, 0 for none. ``threads`` 0 takes every core; results do not depend on it. ``beside`` gives a
+    torque (n_axes,) [Nm] on the motors, held over a sample, for its time [s] and angle [rad], speed [rad/s],
+    acceleration [rad/s^2] and gear load [Nm] of the motors (n_axes,); only of the nonlinear model.
     """
 
 def state_at_rest(robot: Robot, effects: _Effects, joint_angle: Sequence[float]) -> _Array:

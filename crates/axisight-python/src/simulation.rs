@@ -6,11 +6,13 @@ use crate::entry::{CancelToken, detached, flag, input_error};
 use crate::robot::Robot;
 use axisight_core::robot::n_readings;
 use axisight_core::simulation::{
-    self, Batch, BatchError, BatchInput, Effort, Method, Model, Outcome, Status, Traces,
+    self, Batch, BatchError, BatchInput, Beside, Effort, Method, Model, Moment, Outcome, Status,
+    Traces,
 };
-use numpy::{PyArray2, PyReadonlyArray3};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::sync::Mutex;
 
 /// Integrator, from Python.
 #[derive(FromPyObject)]
@@ -107,11 +109,12 @@ struct Options {
     model: Model,
     resolution: f64,
     threads: usize,
+    beside: Option<Py<PyAny>>,
 }
 
 /// Simulate runs from rest, with inputs of the shape `(n_runs, n_samples, n_axes)`.
 #[pyfunction]
-#[pyo3(signature = (robot, effects, input, *, reference, integrator, noise=None, start=None, model="nonlinear", resolution=0.0, threads=0, cancel=None))]
+#[pyo3(signature = (robot, effects, input, *, reference, integrator, noise=None, start=None, model="nonlinear", resolution=0.0, threads=0, beside=None, cancel=None))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a binding
 pub fn simulate_batch<'py>(
     py: Python<'py>,
@@ -125,6 +128,7 @@ pub fn simulate_batch<'py>(
     model: &str,
     resolution: f64,
     threads: usize,
+    beside: Option<Py<PyAny>>,
     cancel: Option<&Bound<'py, CancelToken>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let n_axes = robot.description.n_axes();
@@ -141,6 +145,7 @@ pub fn simulate_batch<'py>(
         model: self::model(model)?,
         resolution,
         threads,
+        beside,
     };
     let (traces, outcomes) = run(py, robot, effects, &input, &noise, options, cancel)?;
     many(py, robot, traces, &outcomes)
@@ -161,7 +166,9 @@ fn run(
     let cancel = flag(cancel);
     let settings = settings(effects);
     let operating_point = || vec![robot.description.operating_point.clone()];
-    let start = options.start.unwrap_or_else(operating_point);
+    let start = options.start.clone().unwrap_or_else(operating_point);
+    let raised = Mutex::new(None);
+    let ask = |now: &Moment| beside_at(options.beside.as_ref()?, now, &raised);
     let batch = Batch {
         robot: &robot.description,
         settings: &settings,
@@ -175,6 +182,7 @@ fn run(
         resolution: options.resolution,
         model: options.model,
         method: options.method,
+        beside: options.beside.as_ref().map(|_| Beside(&ask)),
         cancel: Some(&*cancel),
     };
     let pool = rayon::ThreadPoolBuilder::new()
@@ -184,7 +192,30 @@ fn run(
     let done: Result<(Traces, Vec<Outcome>), BatchError> = detached(py, &cancel, || {
         pool.install(|| simulation::simulate_batch(&batch))
     })?;
+    if let Some(error) = raised.into_inner().unwrap_or_default() {
+        return Err(error);
+    }
     done.map_err(input_error)
+}
+
+/// Torques of the Python function `beside` at a moment; its exception goes to `raised`.
+fn beside_at(beside: &Py<PyAny>, now: &Moment, raised: &Mutex<Option<PyErr>>) -> Option<Vec<f64>> {
+    let torque: PyResult<Vec<f64>> = Python::attach(|py| {
+        let state = [&now.angle, &now.speed, &now.acceleration, &now.load];
+        let [angle, speed, acceleration, load] = state.map(|x| PyArray1::from_slice(py, x));
+        beside
+            .call1(py, (now.time, angle, speed, acceleration, load))?
+            .extract(py)
+    });
+    match torque {
+        Ok(torque) => Some(torque),
+        Err(error) => {
+            if let Ok(mut raised) = raised.lock() {
+                raised.get_or_insert(error);
+            }
+            None
+        }
+    }
 }
 
 /// Name of a status, and the sample to which it refers.

@@ -106,7 +106,7 @@ def diagnose_command(
         Path | None,
         typer.Option(
             help="Write the simulator with its causes here: robot file (.toml), or URDF or MJCF where "
-            "that was diagnosed."
+            "that was diagnosed. With --with-remainder, a robot file also has the modelled remainder."
         ),
     ] = None,
     verbose: Annotated[

@@ -57,7 +57,10 @@ def write_found_model(
 
     Also print the causes that have rivals, and the re-fitted parameters that are not written.
     """
-    if not found.causes and not refitted_gains(inputs.robot, found.refit):
+    modelled = None if found.remainder is None else found.remainder.modelled
+    if modelled is not None and not modelled.model.terms:
+        modelled = None
+    if not found.causes and modelled is None and not refitted_gains(inputs.robot, found.refit):
         say("no model was written: no cause was named")
         return
     made = axisight.write_back.write_model(
@@ -68,6 +71,7 @@ def write_found_model(
         refit=found.refit,
         overwrite=force,
         drives=options.drives(inputs.robot_source) if options.given() else None,
+        remainder=modelled,
     )
     say(f"model: {made.path}, with {', '.join(made.placed) or 'none'}")
     for label in made.left_out:
@@ -81,7 +85,7 @@ def write_found_model(
 
 def _say_refitted(found: Diagnosis, made: Written) -> None:
     """Print re-fitted parameters that are not written, because the gap after includes their part."""
-    left = {k: v for k, v in found.refit.items() if k not in made.placed}
+    left = {k: v for k, v in found.refit.items() if k not in (*made.placed, *made.own)}
     changes = clear_changes(left)
     if changes and found.causes:
         say(

@@ -78,7 +78,7 @@ def with_given(robot: Robot, given: Sequence[Effect]) -> Robot:
 
 
 def say_effects(robot: Robot, source: Path | str, given: Iterable[Effect] = ()) -> None:
-    """Print the robot's own effects that act, except those that ``given`` effects replace.
+    """Print the robot's own effects that act, except those that ``given`` effects replace, and its remainder.
 
     Raises InputError as `refuse_effects_beside`.
     """
@@ -87,6 +87,8 @@ def say_effects(robot: Robot, source: Path | str, given: Iterable[Effect] = ()) 
     acting = [e.label for e in robot.effects if e.acts and e.label not in replaced]
     if acting:
         say(f"with the effects of {source}: {', '.join(acting)}")
+    if robot.remainder is not None:
+        say(f"with the remainder of {source}: {len(robot.remainder.terms)} terms")
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from axisight.fitting.sensed import accelerations, core_readings, joint_angles
 from axisight.fitting.weighting import Weighting
 from axisight.logs import Log
 from axisight.robot import Robot
+from axisight.robot.stated_remainder import refuse_remainder
 from axisight.simulation import Integrator
 
 Array = NDArray[np.float64]
@@ -170,6 +171,7 @@ def simulated_logs(
 
     Arguments are those of `fit`, with ``effects`` placed. Raises InputError as `fit`.
     """
+    refuse_remainder(robot.remainder, "a fit to logs")
     closed = is_closed_loop(robot, logs)
     every, own = with_loads(robot, effects, [log.load for log in logs])
     sensed = []

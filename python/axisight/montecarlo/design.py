@@ -20,6 +20,7 @@ from axisight.errors import InputError, StudyError
 from axisight.montecarlo.study import Study
 from axisight.robot import Robot, load_robot
 from axisight.robot.axis_names import axis_number, effect_on
+from axisight.robot.stated_remainder import refuse_remainder
 from axisight.simulation import Integrator
 
 Arrays = dict[str, NDArray[Any]]
@@ -75,6 +76,7 @@ def core_study(design: str) -> _core.MonteCarloStudy:
         named = isinstance(directions, str)
         plant, measurement = d["plant"], d["measurement"]
         robot = Robot.from_toml(d["robot"]["toml"]).with_parameters(d["robot_parameters"])
+        refuse_remainder(robot.remainder, "a study")
         return _core.MonteCarloStudy(
             robot.core,
             core_effects(_effects(d, robot)),

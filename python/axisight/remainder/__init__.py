@@ -4,7 +4,7 @@ from axisight.remainder.fitting import fit_remainder
 from axisight.remainder.judgement import ModelledRemainder
 from axisight.remainder.model import Remainder
 from axisight.remainder.records import Motion, Record
-from axisight.remainder.running import RunningRemainder
+from axisight.remainder.running import RunningRemainder, last_way
 from axisight.remainder.table_file import load_remainder, save_remainder
 from axisight.remainder.terms import Term
 
@@ -16,6 +16,7 @@ __all__ = [
     "RunningRemainder",
     "Term",
     "fit_remainder",
+    "last_way",
     "load_remainder",
     "save_remainder",
 ]

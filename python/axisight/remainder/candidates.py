@@ -27,6 +27,9 @@ _LEAST_PERIODS = 3
 _MOST_LINES = 4000
 _LINES_A_PERIOD = 4
 _BINS_A_PERIOD = 8
+# Frequencies that are tried between two lines of the transform, and harmonics that count there.
+_FINE = np.linspace(-1.0, 1.0, 41)
+_HARMONICS = (1, 2, 3)
 # Ways in which periodic terms act.
 _WAVES: tuple[Acts, ...] = ("torque", "direction")
 
@@ -90,5 +93,18 @@ def periodic(
         binned = np.bincount(place, weights=acting * residual, minlength=n_bins)
         power = np.abs(np.fft.rfft(binned, _LINES_A_PERIOD * n_bins))[: _LINES_A_PERIOD * most]
         line = (first + int(np.argmax(power[first:]))) / _LINES_A_PERIOD
-        period = span / line
+        period = 1 / _refined(angle, acting * residual, line / span, 1 / (_LINES_A_PERIOD * span))
         yield Candidate(acts, "angle", axis, Scale(0.0, period, None, period))
+
+
+def _refined(angle: Array, signal: Array, frequency: float, step: float) -> float:
+    """Return the frequency [1/rad] near ``frequency`` at which a signal (n,) over an angle (n,) [rad] repeats best.
+
+    Over many periods, a period that is off by the distance of two lines loses its phase.
+    """
+
+    def power(tried: float) -> float:
+        waves = (np.exp(-2j * np.pi * k * tried * angle) for k in _HARMONICS)
+        return float(sum(abs(wave @ signal) ** 2 for wave in waves))
+
+    return float(max(frequency + step * _FINE, key=power))

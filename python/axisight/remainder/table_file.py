@@ -1,4 +1,4 @@
-"""A remainder as a table in TOML, which any simulator can read."""
+"""A remainder as tables in TOML, which any simulator can read: a file of its own, or a part of a robot file."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 import tomlkit
+from tomlkit.items import AoT, Table
 
 from axisight.errors import InputError
 from axisight.remainder.model import Remainder
@@ -29,22 +30,40 @@ the points of x and keeps its end values beyond them; with a period it repeats. 
 _PLAIN = ("axis", "acts", "variable", "of_axis", "unit", "x_unit", "corner_rad_s")
 _ARRAYS = ("x", "value", "standard_error")
 _FIGURES = ("gain", "significance")
-# Digits of the numbers in the file, far below any standard error.
-_DIGITS = 8
 
 
 def save_remainder(remainder: Remainder, path: Path | str, *, overwrite: bool = False) -> None:
     """Write a remainder as TOML (``axisight.remainder/1``); the file appears whole or not at all.
 
-    ``overwrite``: replace an existing file. Raises InputError if it exists otherwise.
+    `load_remainder` returns the same numbers bit by bit. ``overwrite``: replace an existing file. Raises InputError
+    if it exists otherwise.
     """
     check_target(Path(path), overwrite=overwrite)
     document = tomlkit.document()
+    _fill(document, remainder, {"schema": SCHEMA})
+    write_whole(Path(path), tomlkit.dumps(document))
+
+
+def remainder_table(remainder: Remainder) -> Table:
+    """Return a remainder as the table of a TOML document, without the schema of a file of its own."""
+    table = tomlkit.table()
+    _fill(table, remainder, {})
+    return table
+
+
+def _fill(
+    table: Table | tomlkit.TOMLDocument, remainder: Remainder, first: Mapping[str, str]
+) -> None:
     for line in _HEAD.splitlines():
-        document.add(tomlkit.comment(line))
-    document["schema"] = SCHEMA
+        table.add(tomlkit.comment(line))
+    table.update(first)
     for name in ("limits_nm", "held_out_nm"):
-        document[name] = [_rounded(x) for x in getattr(remainder, name).tolist()]
+        table[name] = getattr(remainder, name).tolist()
+    if remainder.terms:
+        table["term"] = _terms(remainder)
+
+
+def _terms(remainder: Remainder) -> AoT:
     terms = tomlkit.aot()
     for term in remainder.terms:
         table = tomlkit.table()
@@ -54,18 +73,12 @@ def save_remainder(remainder: Remainder, path: Path | str, *, overwrite: bool = 
         if term.period is not None:
             table["period"] = term.period
         for name in _FIGURES:
-            table[name] = _rounded(getattr(term, name))
+            table[name] = float(getattr(term, name))
         table["hint"] = term.hint
         for name in _ARRAYS:
-            table[name] = [_rounded(x) for x in getattr(term, name).tolist()]
+            table[name] = getattr(term, name).tolist()
         terms.append(table)
-    if remainder.terms:
-        document["term"] = terms
-    write_whole(Path(path), tomlkit.dumps(document))
-
-
-def _rounded(x: float) -> float:
-    return float(f"{x:.{_DIGITS}g}")
+    return terms
 
 
 def load_remainder(path: Path | str) -> Remainder:
@@ -79,6 +92,14 @@ def load_remainder(path: Path | str) -> Remainder:
         raise InputError(f"{path}: expected a remainder table in TOML: {error}") from None
     if given.get("schema") != SCHEMA:
         raise InputError(f"{path}: schema: expected {SCHEMA!r}, got {given.get('schema')!r}")
+    return remainder_of(given, path)
+
+
+def remainder_of(given: Mapping[str, Any], path: Path | str) -> Remainder:
+    """Return the remainder of a table that was read; ``path``: what errors call its file.
+
+    Raises InputError that names the key.
+    """
     limits, held_out = (_numbers(path, given, name) for name in ("limits_nm", "held_out_nm"))
     if limits.shape != held_out.shape:
         raise InputError(f"{path}: held_out_nm: expected as many numbers as limits_nm")

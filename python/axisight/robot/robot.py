@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
 from axisight.arguments import did_you_mean, instance, positive
-from axisight.display import html
 from axisight.effects import Effect, core_effects, effect_of_core
 from axisight.errors import InputError
+from axisight.remainder import Remainder
 from axisight.robot.accelerometer import (
     Accelerometer,
     accelerometer_of,
@@ -26,6 +26,8 @@ from axisight.robot.accelerometer import (
 from axisight.robot.axis_names import axis_number, effect_on
 from axisight.robot.description import Joint, joint_of
 from axisight.robot.limits import JointLimits, limits_of
+from axisight.robot.notebook import page_of
+from axisight.robot.stated_remainder import described_with_remainder, stated_remainder
 
 Array = NDArray[np.float64]
 
@@ -73,6 +75,7 @@ class Robot:
         document = tomllib.loads(text)
         out._states_pose = "operating_point" in document
         out._joint_limits = limits_of(document)
+        stated_remainder(text, out.n_axes)  # refuses a table that is none
         return out
 
     def __repr__(self) -> str:
@@ -81,22 +84,7 @@ class Robot:
 
     def _repr_html_(self) -> str:
         """Return the axes with drives and operating point as HTML, for notebooks."""
-        kinds = ["slides" if slides else "turns" for slides in self.axis_is_prismatic]
-        gears = ["rigid" if rigid else "elastic" for rigid in self.axis_is_rigid]
-        ratios, pose = (map(html.number, x) for x in (self.gear_ratio, self.operating_point))
-        numbers = map(str, range(1, self.n_axes + 1))
-        rows = zip(numbers, self.axis_names, kinds, gears, ratios, pose, strict=True)
-        acting = [effect.label for effect in self.effects if effect.acts]
-        return html.page(
-            f"{self.name}: {self.n_axes} axes, {self.n_joints} joints, "
-            f"sample time {self.sample_time_s:g} s, controller {self.controller_kind}",
-            html.table(
-                ("axis", "joint", "kind", "gear", "gear ratio", "operating point [rad or m]"),
-                rows,
-                "Axes",
-            ),
-            html.lines([f"with the effects {', '.join(acting)}"] if acting else []),
-        )
+        return page_of(self)
 
     @property
     def name(self) -> str:
@@ -152,6 +140,11 @@ class Robot:
     def accelerometers(self) -> tuple[Accelerometer, ...]:
         """The accelerometers on its links."""
         return tuple(map(accelerometer_of, _core.accelerometers(self.core)))
+
+    @property
+    def remainder(self) -> Remainder | None:
+        """The modelled remainder that the description states: torque [Nm] that its simulation adds."""
+        return stated_remainder(self.core.toml, self.n_axes)
 
     @property
     def gravity_m_s2(self) -> Array:
@@ -378,6 +371,11 @@ class Robot:
         Raises RobotError for a name that comes twice and for a joint that the robot does not have.
         """
         text = described_with(self.core.toml, accelerometers)
+        return self._with_core(_core.described_as(self.core, text))
+
+    def with_remainder(self, remainder: Remainder | None) -> Robot:
+        """Return the same robot with another `remainder`; raise InputError for other axes."""
+        text = described_with_remainder(self.core.toml, remainder, self.n_axes)
         return self._with_core(_core.described_as(self.core, text))
 
     def with_controller_speed(self, factor: float) -> Robot:

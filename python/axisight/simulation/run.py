@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib.metadata import version
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 import xarray as xr
@@ -15,8 +15,10 @@ from axisight import _core
 from axisight.arguments import one_of
 from axisight.effects import Effect, core_effects
 from axisight.errors import InputError
+from axisight.remainder import RunningRemainder
 from axisight.robot import Robot
 from axisight.robot.accelerometer import DIRECTIONS, by_direction
+from axisight.simulation.beside import Beside, acting_remainder, beside
 from axisight.simulation.inputs import given_noise, one_input, start_angles
 from axisight.simulation.integrator import Integrator, Method
 from axisight.simulation.noise import sensor_noise
@@ -41,6 +43,7 @@ def simulate(
     method: Method = "dopri5",
     tolerance: float = 1e-7,
     substeps: int = 1,
+    remainder: RunningRemainder | None = None,
 ) -> xr.Dataset:
     """Return a simulation from rest at an operating point, at the controller's sample time.
 
@@ -61,6 +64,8 @@ def simulate(
         nonlinear ripple and torque path (thesis section 8.1).
     method, tolerance, substeps : integrator of the nonlinear model, e.g. ``"dopri5"`` with a
         tolerance or ``"rk4"`` with sub-steps; see :class:`axisight.simulation.Integrator`.
+    remainder : a modelled remainder with its start, in place of that of the robot's file. By default each
+        axis moved last in the direction in which its reference moves first.
 
     Returns
     -------
@@ -89,6 +94,7 @@ def simulate(
         model=model,
         integrator=Integrator(method, tolerance, substeps),
         threads=1,
+        remainder=remainder,
     )
     at = out["stopped_at"][0]
     attrs = {
@@ -121,6 +127,7 @@ def simulate_batch(
     tolerance: float = 1e-7,
     substeps: int = 1,
     threads: int = 0,
+    remainder: RunningRemainder | None = None,
 ) -> xr.Dataset:
     """Return the simulations of many runs of one robot, computed eight in lock-step per thread.
 
@@ -139,8 +146,8 @@ def simulate_batch(
     threads : number of threads, 0 for all cores. The result does not depend on it.
     start_rad : (n_axes,) driven joint angles at rest [rad], or (n_runs, n_axes) for a start per run;
         the linear model allows one start. Default the operating point.
-    effects, noise_cutoff_hz, position_resolution_rad, model, method, tolerance, substeps : as in
-    :func:`simulate`, the same for all runs.
+    effects, noise_cutoff_hz, position_resolution_rad, model, method, tolerance, substeps, remainder : as in
+    :func:`simulate`, the same for all runs. Runs with a remainder are computed one after another.
 
     Returns
     -------
@@ -164,6 +171,7 @@ def simulate_batch(
         model=model,
         integrator=Integrator(method, tolerance, substeps),
         threads=threads,
+        remainder=remainder,
     )
     attrs = {
         "noise_seed": -1 if noise_seed is None else noise_seed,
@@ -193,6 +201,7 @@ def _simulated(
     model: Model,
     integrator: Integrator,
     threads: int,
+    remainder: RunningRemainder | None,
 ) -> _core.BatchOutput:
     """Return the simulation of ``runs``, whose numbers determine the noise.
 
@@ -209,18 +218,44 @@ def _simulated(
             row[:] = sensor_noise(robot, noise_seed, run, shape[1], noise_cutoff_hz)
     if threads < 0:
         raise InputError(f"threads: expected 0 (all cores) or more, got {threads}")
-    return _core.simulate_batch(
-        robot.core,
-        core_effects(robot.placed(effects)),
-        data.reshape(shape),
-        reference=reference,
-        integrator=integrator,
-        noise=None if error is None else error.reshape(shape),
-        start=start_angles(robot, start_rad, len(runs)),
-        model=model,
-        resolution=resolution_rad,
-        threads=threads,
+    running = acting_remainder(robot, remainder, model)
+    starts = start_angles(robot, start_rad, len(runs))
+    placed = core_effects(robot.placed(effects))
+    inputs = data.reshape(shape)
+    disturbed = None if error is None else error.reshape(shape)
+
+    def simulated(of: slice, acting: Beside | None) -> _core.BatchOutput:
+        return _core.simulate_batch(
+            robot.core,
+            placed,
+            inputs[of],
+            reference=reference,
+            integrator=integrator,
+            noise=None if disturbed is None else disturbed[of],
+            start=starts[of] if starts and len(starts) > 1 else starts,
+            model=model,
+            resolution=resolution_rad,
+            threads=threads,
+            beside=acting,
+        )
+
+    if running is None:
+        return simulated(slice(None), None)
+    each = (
+        simulated(slice(i, i + 1), beside(running, inputs[i] if reference else None))
+        for i in range(len(runs))
     )
+    return _joined(list(each))
+
+
+def _joined(each: Sequence[_core.BatchOutput]) -> _core.BatchOutput:
+    """Return the outputs of single runs as that of a batch."""
+    out: dict[str, Any] = {}
+    for name, first in each[0].items():
+        parts = [cast("dict[str, Any]", one)[name] for one in each]
+        is_signal = isinstance(first, np.ndarray)
+        out[name] = np.concatenate(parts) if is_signal else [x for part in parts for x in part]
+    return cast("_core.BatchOutput", out)
 
 
 _Counter = Literal[

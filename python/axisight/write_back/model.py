@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from axisight.effects.dcmotor import DEVICE_EFFECTS
 from axisight.effects.stated import OTHER_GAINS, PLAY
 from axisight.errors import InputError
 from axisight.mujoco.torques import acts_in_gear, is_torque
+from axisight.remainder import ModelledRemainder
 from axisight.robot import Robot
 from axisight.robot_file import Provenance, identified, sidecar_path, write_identified
 from axisight.robot_import.bodies import Drive
@@ -30,6 +31,7 @@ from axisight.write_back.mjcf.limits import limits_of
 from axisight.write_back.mjcf.passive import write_devices
 from axisight.write_back.mjcf.play import is_play, write_play
 from axisight.write_back.mjcf.readings import READING_EFFECTS, write_readings
+from axisight.write_back.modelled import REMAINDER, TWICE, Own, why_not, with_modelled
 from axisight.write_back.placed import Labelled, Placed, doubt
 from axisight.write_back.refitted import Refitted, refitted_gains
 from axisight.write_back.xml_edits import Edits
@@ -52,8 +54,9 @@ _Source = tuple[Path, DriveData | None]
 class Written:
     """A written model: labels of causes and re-fitted gains that it contains, and of those it cannot express.
 
-    ``why``: reasons for the latter, by label. ``remaining``: causes among them as effects;
-    `axisight.mujoco.apply` takes those that are torques or act inside gears.
+    A modelled remainder has the label ``remainder``. ``why``: reasons for what is left out, by label.
+    ``remaining``: causes among it as effects; `axisight.mujoco.apply` takes those that are torques or act inside
+    gears. ``own``: re-fitted own parameters that were written with a remainder.
     """
 
     path: Path
@@ -61,6 +64,7 @@ class Written:
     left_out: tuple[str, ...]
     why: Mapping[str, str] = field(default_factory=dict)
     remaining: tuple[Effect, ...] = ()
+    own: tuple[str, ...] = ()
 
 
 def write_model(
@@ -73,6 +77,7 @@ def write_model(
     overwrite: bool = False,
     drives: DriveData | None = None,
     play_joints: bool = False,
+    remainder: ModelledRemainder | None = None,
 ) -> Written:
     """Write the model of a diagnosis with its causes, and return what it contains.
 
@@ -95,14 +100,31 @@ def write_model(
         The drive data ``robot`` was read with; None: those beside the file.
     play_joints
         Write backlash into an MJCF as a joint of its own with a range, which adds a position to the model.
+    remainder
+        `Diagnosis.remainder.modelled`: it goes into the table ``[remainder]`` of a robot file, with the re-fitted
+        own parameters if it belongs to them. URDF and MJCF have no place for it.
 
     Raises InputError as `check_target` does, and for a ``source`` that is no URDF or MJCF in UTF-8.
     """
     check_target(source, target, overwrite=overwrite)
     path, gains = Path(target), refitted_gains(robot, refit)
     if path.suffix.lower() == ".toml":
-        return _as_robot_file(robot, causes, gains, path, overwrite=overwrite)
-    return _as_model((Path(source), drives), robot, (causes, gains), path, play_joints=play_joints)
+        return _as_robot_file(robot, (causes, gains), path, (remainder, refit), overwrite=overwrite)
+    written = _as_model(
+        (Path(source), drives), robot, (causes, gains), path, play_joints=play_joints
+    )
+    if remainder is None:
+        return written
+    kind = "robot" if path.suffix.lower() == ".urdf" else "mujoco"
+    return _without_remainder(written, why_not(kind))
+
+
+def _without_remainder(written: Written, why: str) -> Written:
+    return replace(
+        written,
+        left_out=(*written.left_out, REMAINDER),
+        why={**written.why, REMAINDER: why},
+    )
 
 
 def check_target(source: Path | str, target: Path | str, *, overwrite: bool = False) -> None:
@@ -122,28 +144,34 @@ def check_target(source: Path | str, target: Path | str, *, overwrite: bool = Fa
         )
 
 
+# Causes and re-fitted gains.
+_Found = tuple[Sequence["Cause"], Sequence[Refitted]]
+# A remainder and all re-fitted parameters.
+_Left = tuple[ModelledRemainder | None, "Mapping[str, Interval]"]
+
+
 def _as_robot_file(
-    robot: Robot,
-    causes: Sequence[Cause],
-    gains: Sequence[Refitted],
-    path: Path,
-    *,
-    overwrite: bool,
+    robot: Robot, findings: _Found, path: Path, left: _Left, *, overwrite: bool
 ) -> Written:
+    (causes, gains), (remainder, refit) = findings, left
+    twice = remainder is not None and robot.remainder is not None
+    own = Own()
+    if remainder is not None and not twice:
+        robot, own = with_modelled(robot, remainder, refit)
     doubts = [f"{cause.label}: {words}" for cause in causes for words in doubt(cause)]
     found = identified(
-        {gain.label: gain.value for gain in gains},
+        {gain.label: gain.value for gain in gains} | own.values,
         Provenance("; ".join(["diagnosis of the sim-to-real gap", *doubts])),
-        standard_errors={gain.label: gain.standard_error for gain in gains},
+        standard_errors={gain.label: gain.standard_error for gain in gains} | own.standard_errors,
         effects=[cause.as_effect() for cause in causes],
     )
     write_identified(robot, path, found, overwrite=overwrite)
     every: list[Labelled] = [*causes, *gains]
-    return Written(path, tuple(x.label for x in every), ())
-
-
-# Causes and re-fitted gains.
-_Found = tuple[Sequence["Cause"], Sequence[Refitted]]
+    placed = [x.label for x in every]
+    if remainder is not None and not twice:
+        placed.append(REMAINDER)
+    written = Written(path, tuple(placed), (), own=tuple(own.values))
+    return _without_remainder(written, TWICE) if twice else written
 
 
 def _as_model(

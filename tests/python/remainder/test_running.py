@@ -13,6 +13,7 @@ from axisight.remainder import (
     RunningRemainder,
     Term,
     fit_remainder,
+    last_way,
     load_remainder,
     save_remainder,
 )
@@ -93,8 +94,48 @@ def test_a_run_that_begins_anew_forgets(remainder: Remainder) -> None:
     first = running(0.0, zero, zero, zero, zero)
     running(1.0, zero + 1.0, zero, zero, zero)
     np.testing.assert_array_equal(running(0.0, zero, zero, zero, zero), first)
-    with pytest.raises(InputError, match="start_way"):
-        RunningRemainder(remainder, start_way=[1.0])
+
+
+def test_misuse_of_a_start_is_refused(remainder: Remainder) -> None:
+    for given in ([1.0], [1.0, 0.5], [1.0, np.nan]):
+        with pytest.raises(InputError, match="start_way"):
+            RunningRemainder(remainder, start_way=given)
+    with pytest.raises(InputError, match="reverses_rad"):
+        RunningRemainder(remainder, reverses_rad=0.0)
+    with pytest.raises(InputError, match="temperature_c"):
+        RunningRemainder(remainder, temperature_c=[20.0, np.nan])
+
+
+def test_the_first_speed_tells_the_way(remainder: Remainder) -> None:
+    """Below the corner of its terms, 0.05 rad/s here, an axis stands."""
+    zero = np.zeros(2)
+    for speed, way in ((0.2, 1), (-0.2, -1), (0.04, 0)):
+        running = RunningRemainder(remainder)
+        at = running.at(0.0, zero, np.array([speed, 0.0]), zero, zero)
+        np.testing.assert_array_equal(at.way[0], [way, 0])
+
+
+def test_the_end_of_a_log_tells_the_way() -> None:
+    t = np.linspace(0.0, 1.0, 200)[:, None]
+    there_and_back = np.minimum(t, 1.5 - t)
+    noise = np.random.default_rng(0).normal(0.0, 1e-3, (200, 3))
+    way = last_way(np.hstack([t, there_and_back, 0 * t]) + noise)
+    np.testing.assert_array_equal(way, [1, -1, 0])
+    with pytest.raises(InputError, match="position_rad"):
+        last_way(t[:, 0])
+
+
+def test_a_given_temperature_counts_until_a_call_gives_one() -> None:
+    warm = term(
+        acts="torque", variable="temperature", x=np.array([20.0, 40.0]), value=np.array([2.0, 4.0])
+    )
+    zero = np.zeros(2)
+    running = RunningRemainder(
+        Remainder((warm,), np.full(2, 9.0), zero), temperature_c=[30.0, 30.0]
+    )
+    assert not running.lacks_temperature
+    assert running(0.0, zero, zero, zero, zero)[0] == pytest.approx(3.0)
+    assert running(0.1, zero, zero, zero, zero, np.array([40.0, 20.0]))[0] == pytest.approx(4.0)
 
 
 def test_a_file_holds_the_same_torque(remainder: Remainder, tmp_path: Path) -> None:
@@ -102,7 +143,7 @@ def test_a_file_holds_the_same_torque(remainder: Remainder, tmp_path: Path) -> N
     save_remainder(remainder, path)
     at = motion(5)
     np.testing.assert_allclose(
-        load_remainder(path).torque(at), remainder.torque(at), rtol=1e-7, atol=1e-9
+        load_remainder(path).torque(at), remainder.torque(at), rtol=0, atol=0
     )
     with pytest.raises(InputError):
         save_remainder(remainder, path)

@@ -16,6 +16,7 @@ from axisight.errors import InputError
 from axisight.gap.facts.result import Cause, Interval
 from axisight.gap.facts.simulator_variant import Variant
 from axisight.gap.simulator.rigid_torque import predicted_torque
+from axisight.remainder import ModelledRemainder, Remainder
 from axisight.write_back import write_model
 from found_causes import several
 from import_data import MJCF, URDF, changed, written
@@ -420,6 +421,26 @@ def test_what_has_no_place_is_told_why(tmp_path: Path):
         "link_inertia@2": "the inertia that 'lower' would have is that of no body",
         "torque_ripple@1": "URDF has no number for it",
     }
+
+
+def test_a_remainder_has_no_place_in_other_formats(tmp_path: Path):
+    none = np.zeros(2)
+    modelled = ModelledRemainder(
+        model=Remainder((), none, none),
+        gap_before=0.2,
+        gap_after=0.1,
+        before_per_axis=none,
+        after_per_axis=none,
+        moving_before=0.2,
+        moving_after=0.1,
+    )
+    for name, text, word in (("arm.xml", MJCF, "apply_remainder"), ("arm.urdf", URDF, "URDF")):
+        source = written(tmp_path, text, name)
+        robot, target = load_robot(source), tmp_path / f"new_{name}"
+        made = write_model(source, robot, [], target, remainder=modelled)
+        assert made.left_out == ("remainder",)
+        assert word in made.why["remainder"]
+        assert target.read_bytes() == source.read_bytes()
 
 
 def test_misuse_is_named(tmp_path: Path):

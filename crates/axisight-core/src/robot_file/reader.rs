@@ -34,7 +34,8 @@ const ROOT_KEYS: &[&str] = &[
     "operating_point",
 ];
 /// Keys of version 2 only.
-const NEWER_ROOT_KEYS: &[&str] = &["accelerometer", "effect", "tolerances"];
+// The table of the remainder is for the Python package, which checks it.
+const NEWER_ROOT_KEYS: &[&str] = &["accelerometer", "effect", "remainder", "tolerances"];
 const JOINT_KEYS: &[&str] = &[
     "name",
     "kind",

@@ -11,7 +11,7 @@ use super::linear::{LinearPlant, LinearPlantError, simulate_linear};
 use crate::plant::{Plant, PlantError, assemble, stepper};
 use crate::robot::{EffectSetting, RobotDescription, n_readings};
 use axisight_plant::simulation::{
-    Drive, Effort, Method, Run, Sample, SimulationError, Status, Stepper, simulate,
+    Beside, Drive, Effort, Method, Run, Sample, SimulationError, Status, Stepper, simulate_beside,
 };
 use axisight_scalar::{Lanes, Scalar};
 use rayon::prelude::*;
@@ -67,6 +67,8 @@ pub struct Batch<'a> {
     pub model: Model,
     /// Integrator.
     pub method: Method,
+    /// Torques beside the plant; runs are then simulated one by one. The linear plant has none.
+    pub beside: Option<Beside<'a>>,
     /// Flag by which another thread ends the runs early.
     pub cancel: Option<&'a AtomicBool>,
 }
@@ -186,11 +188,8 @@ pub fn simulate_batch(batch: &Batch<'_>) -> Result<(Traces, Vec<Outcome>), Batch
         }
         .into());
     }
-    let width = if batch.method.may_be_implicit() && linear.is_none() {
-        1
-    } else {
-        LANES
-    };
+    let alone = batch.method.may_be_implicit() || batch.beside.is_some();
+    let width = if alone && linear.is_none() { 1 } else { LANES };
     if batch.start.len() != 1 && batch.start.len() != runs.len() {
         return Err(SimulationError::Shape {
             field: "start",
@@ -295,7 +294,7 @@ impl Group<'_> {
         let joints = plant.n_motors()..plant.n_motors() + plant.chain.len();
         let runs: Vec<usize> = lanes.iter().map(|l| self.runs[*l]).collect();
         let status = batch.with_run(&runs, |run| {
-            simulate(plant, run, &mut stepper, &mut |sample| {
+            simulate_beside(plant, run, batch.beside, &mut stepper, &mut |sample| {
                 self.take(lanes, sample, &motors, &joints);
             })
         })?;
@@ -439,6 +438,7 @@ joint_angle = [0.2]
                     resolution: 0.0,
                     model,
                     method: Method::RungeKutta4 { substeps: 1 },
+                    beside: None,
                     cancel: Some(&cancel),
                 };
                 let (traces, outcomes) = simulate_batch(&batch).expect("a valid batch");

@@ -5,8 +5,8 @@ pub mod linear;
 mod noise;
 
 pub use axisight_plant::simulation::{
-    CourseOfAnother, Drive, Effort, Method, Run, Sample, SimulationError, Status, Stepper,
-    simulate, stable_substeps,
+    Beside, CourseOfAnother, Drive, Effort, Method, Moment, Run, Sample, SimulationError, Status,
+    Stepper, simulate, stable_substeps,
 };
 pub use batch::{Batch, BatchError, BatchInput, Model, Outcome, Traces, simulate_batch};
 pub use linear::{LinearPlant, LinearPlantError, simulate_linear};

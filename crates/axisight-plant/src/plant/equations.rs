@@ -274,6 +274,21 @@ impl<S: Scalar> Plant<S> {
         }
     }
 
+    /// Torque through the gear of each axis [Nm, motor side], in state `x` with the rates `dx`. Of a
+    /// rigid gear it is what the motor does not need for its own inertia and friction.
+    pub fn gear_loads(&self, x: &[S], dx: &[S], applied: &[S], command: &[S], out: &mut [S]) {
+        self.motor_disturbances(x, command, out);
+        for (i, axis) in self.axes.iter().enumerate() {
+            if axis.gear.is_some() {
+                out[i] = self.driven(axis, x, applied[i], command[i], &mut []).load;
+            } else {
+                let own = axis.viscous_friction * self.motor_speed(axis, x);
+                // The rates of the rates stand where the rates do in the state.
+                out[i] += applied[i] - own - axis.motor_inertia * self.motor_speed(axis, dx);
+            }
+        }
+    }
+
     /// Torques of an axis. Rates of the effects' own states are written only if `own_rates` has
     /// room for them.
     #[inline(always)]

@@ -1,6 +1,8 @@
 //! The sampled loop: measure, command, integrate to the next sample.
 
+use super::beside::{Beside, HeldBeside};
 use super::controller::{ControlLoop, OwnLaw};
+use super::lanes::{lane_value, value_at};
 use super::late_reading::LateReading;
 use super::method::{Interval, Method, Stepper};
 use super::sensing::Sensing;
@@ -161,6 +163,21 @@ pub fn simulate<S: Scalar>(
     stepper: &mut Stepper<S>,
     observe: &mut dyn FnMut(&Sample<'_, S>),
 ) -> Result<Status, SimulationError> {
+    simulate_beside(plant, run, None, stepper, observe)
+}
+
+/// [`simulate`] with torques beside the plant, which are held over a sample.
+///
+/// # Errors
+/// [`SimulationError`] as [`simulate`].
+#[inline(never)]
+pub fn simulate_beside<S: Scalar>(
+    plant: &Plant<S>,
+    run: &Run<'_>,
+    beside: Option<Beside<'_>>,
+    stepper: &mut Stepper<S>,
+    observe: &mut dyn FnMut(&Sample<'_, S>),
+) -> Result<Status, SimulationError> {
     let n_axes = plant.axes.len();
     let n_samples = check(run, n_axes, S::LANES)?;
     check_turned(plant)?;
@@ -176,9 +193,16 @@ pub fn simulate<S: Scalar>(
             method: run.method,
         });
     }
-    let rest = equilibrium(plant, &run.start_angles(n_axes))?;
+    let mut rest = equilibrium(plant, &run.start_angles(n_axes))?;
     stepper.begin();
     let mut x = plant.state_at_rest(&rest);
+    let mut beside = match beside {
+        Some(ask) => match HeldBeside::new(ask, plant, &mut rest, &x)? {
+            Some(held) => Some(held),
+            None => return Ok(Status::Cancelled(0)),
+        },
+        None => None,
+    };
     let mut controller = ControlLoop::new(
         run.controller,
         run.sample_time,
@@ -203,8 +227,13 @@ pub fn simulate<S: Scalar>(
         }
         signals.measure(plant, run, k, &x);
         signals.command(run, k, &mut controller);
+        if let Some(beside) = &mut beside
+            && !beside.ask_at(plant, k as f64 * run.sample_time, &x, &mut buffers.beside)?
+        {
+            return Ok(Status::Cancelled(k));
+        }
         if run.disturbances {
-            signals.disturb(plant, &x);
+            signals.disturb(plant, &x, &buffers.beside);
         }
         if let Some(sensing) = &mut sensing {
             sensing.read(plant, k, &x);
@@ -222,6 +251,9 @@ pub fn simulate<S: Scalar>(
         let met = interval.advance(run.method, &mut x, stepper, &mut torque);
         if let Some(sensing) = &mut sensing {
             sensing.note(&torque, &signals.command);
+        }
+        if let Some(beside) = &mut beside {
+            beside.note(&torque, &signals.command);
         }
         torque.finish();
         if !all_finite(&x) {
@@ -434,9 +466,12 @@ impl<S: Scalar> Signals<S> {
         }
     }
 
-    /// Compute the torque that effects add on the motors in the present state.
-    fn disturb(&mut self, plant: &Plant<S>, x: &[S]) {
+    /// Compute the torque on the motors of effects and `beside` the plant in the present state.
+    fn disturb(&mut self, plant: &Plant<S>, x: &[S], beside: &[S]) {
         plant.motor_disturbances(x, &self.command, &mut self.torque_disturbance);
+        for (torque, beside) in self.torque_disturbance.iter_mut().zip(beside) {
+            *torque += *beside;
+        }
     }
 
     /// The sample `index` in state `x` with the readings of accelerometers, for an observer.
@@ -460,41 +495,6 @@ impl<S: Scalar> Signals<S> {
             state: x,
         }
     }
-}
-
-/// Entry `(k, axis)` of each lane's array; zero beyond its end, or if there are no arrays.
-#[inline(always)]
-pub fn lane_value<S: Scalar>(arrays: &[&[f64]], k: usize, axis: usize, n_axes: usize) -> S {
-    S::from_lanes(|lane| {
-        let array = arrays.get(lane).or_else(|| arrays.last());
-        array
-            .and_then(|a| a.get(k * n_axes + axis))
-            .copied()
-            .unwrap_or(0.0)
-    })
-}
-
-/// Entry of each lane's array at sample `(1 + drift) k`, linearly interpolated. Outside of the
-/// array it is the first or last entry.
-fn value_at<S: Scalar>(arrays: &[&[f64]], k: usize, drift: S, axis: usize, n_axes: usize) -> S {
-    let late = drift * k as f64;
-    let whole = S::from_lanes(|lane| late.lane(lane).floor());
-    let at = |further: f64| {
-        S::from_lanes(|lane| {
-            let Some(array) = arrays.get(lane).or_else(|| arrays.last()) else {
-                return 0.0;
-            };
-            let last = (array.len() / n_axes).saturating_sub(1);
-            // The cast is safe: drifts are bounded, and runs have far fewer samples than a float
-            // has digits.
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            let sample = (k as f64 + whole.lane(lane) + further).max(0.0) as usize;
-            let entry = array.get(sample.min(last) * n_axes + axis);
-            entry.copied().unwrap_or(0.0)
-        })
-    };
-    let before = at(0.0);
-    (late - whole).fma(at(1.0) - before, before)
 }
 
 /// Check a run of `n_axes` axes in at most `lanes` lanes; returns its number of samples.

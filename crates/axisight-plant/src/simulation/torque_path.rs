@@ -200,6 +200,8 @@ pub struct TorqueBuffers<S> {
     commands: Vec<S>,
     /// Part of the commands that acts on the motors at once.
     added: Vec<S>,
+    /// Torques on the motors beside those of the drives [Nm].
+    pub beside: Vec<S>,
     /// Lag states at the start and at the end of the current span.
     at_start: Vec<States<S>>,
     at_end: Vec<States<S>>,
@@ -213,6 +215,7 @@ impl<S: Scalar> TorqueBuffers<S> {
         Self {
             commands: vec![S::zero(); n_axes],
             added: vec![S::zero(); n_axes],
+            beside: vec![S::zero(); n_axes],
             at_start: states.clone(),
             at_end: states,
             lines: Vec::with_capacity(n_axes),
@@ -253,12 +256,13 @@ impl<'a, S: Scalar> SampleTorque<'a, S> {
             let TorqueBuffers {
                 commands,
                 added,
+                beside,
                 lines,
                 ..
             } = &mut *torque.buffers;
             let held = torque.paths.iter().zip(commands).zip(added);
-            lines.extend(held.map(|((path, u), own)| Line {
-                mean: path.delivered(*u) + path.gained(*own),
+            lines.extend(held.zip(beside).map(|(((path, u), own), beside)| Line {
+                mean: path.delivered(*u) + path.gained(*own) + *beside,
                 slope: S::zero(),
             }));
         }
@@ -271,16 +275,17 @@ impl<'a, S: Scalar> SampleTorque<'a, S> {
             let TorqueBuffers {
                 commands,
                 added,
+                beside,
                 at_start,
                 at_end,
                 lines,
             } = &mut *self.buffers;
             at_end.copy_from_slice(at_start);
             lines.clear();
-            let told = commands.iter().zip(added);
-            for ((path, (u, own)), state) in self.paths.iter().zip(told).zip(at_end) {
+            let told = commands.iter().zip(added).zip(beside);
+            for ((path, ((u, own), beside)), state) in self.paths.iter().zip(told).zip(at_end) {
                 let mut line = path.line(*u, from, to, state);
-                line.mean += path.gained(*own);
+                line.mean += path.gained(*own) + *beside;
                 lines.push(line);
             }
         }

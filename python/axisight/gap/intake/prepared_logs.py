@@ -111,6 +111,11 @@ class PreparedLogs:
             simulator=found,
         )
 
+    def without_remainder(self, logs: Sequence[Log]) -> PreparedLogs:
+        """Return the same with estimation and then validation ``logs`` without the robot's remainder."""
+        n, robot = len(self.estimation), self.robot.with_remainder(None)
+        return replace(self, robot=robot, estimation=list(logs[:n]), validation=list(logs[n:]))
+
     def compared_later(self, view: View, baseline: FittedModel, settings: Settings) -> PreparedLogs:
         """Return the same with logs that are compared later where the machine begins elsewhere than the simulation.
 

@@ -35,7 +35,6 @@ def records_of(
 
     Protected are the parameters of the causes. ``certain``: weights with which the causes were fitted, by log.
     """
-    carried = _without_drives(view.robot, after)
     changes = _changes(view.robot, after)
     out = []
     weights = [None] * len(logs) if certain is None else certain
@@ -47,7 +46,7 @@ def records_of(
         protected = [_derivative(view, log, at, change) for change in changes]
         out.append(
             Record(
-                motion=course_of(view, log, predicted_torque(*carried, at)),
+                motion=course_of(view, log, gear_load(view, log, after)),
                 residual_nm=judged * residual,
                 weight=view.counted(log) * np.ones(log.n_axes),
                 protected=np.stack(protected, axis=2) if protected else None,
@@ -56,6 +55,11 @@ def records_of(
             )
         )
     return out
+
+
+def gear_load(view: InverseView, log: Log, after: Variant) -> Array:
+    """Return the load on the gears (n, n_axes) [Nm] along a log: torques of bodies alone, motor side."""
+    return predicted_torque(*_without_drives(view.robot, after), view.filtering(log))
 
 
 def course_of(view: InverseView, log: Log, load_nm: Array) -> Course:

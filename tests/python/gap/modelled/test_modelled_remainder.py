@@ -7,13 +7,14 @@ import jsonschema
 import numpy as np
 import pytest
 
-from axisight import Diagnosis, Log, Robot, Settings, diagnose
+from axisight import Diagnosis, Log, Robot, Settings, diagnose, load_robot
 from axisight.gap import verdict_schema
 from axisight.gap.facts.simulator_variant import AS_GIVEN
 from axisight.gap.simulator.rigid_torque import predicted_torque
 from axisight.logs import lowpass
 from axisight.remainder import Motion
 from axisight.report import render_report
+from axisight.write_back import write_model
 
 RATE_HZ = 200.0
 ROBOT = """
@@ -78,6 +79,10 @@ def logs() -> tuple[Robot, list[Log], list[Log]]:
     # Of another kind: both axes to and fro at constant speeds, with smooth turns.
     swing = np.arcsin(0.98 * np.sin(2 * np.pi * np.stack([0.25 * t, 0.17 * t], axis=1)))
     return robot, fitted, [log_of(robot, "to and fro", 0.4 * swing, 9)]
+
+
+# What the remainder of these logs does not depend on.
+_OTHERS = ("position_rad", "acceleration_rad_s2", "load_nm")
 
 
 @pytest.fixture(scope="module")
@@ -155,3 +160,52 @@ def _torque(robot: Robot, found: Diagnosis, log: Log) -> np.ndarray:
         load_nm=predicted_torque(bodies, AS_GIVEN, at),
     )
     return found.remainder.modelled.model.torque(motion)
+
+
+def test_a_written_model_has_the_gap_that_was_told(
+    both: tuple[Diagnosis, Diagnosis],
+    logs: tuple[Robot, list[Log], list[Log]],
+    tmp_path: Path,
+) -> None:
+    """A diagnosis of the written model begins where that with the remainder ended."""
+    found, (robot, fitted, other) = both[1], logs
+    assert found.remainder is not None and found.remainder.modelled is not None
+    modelled = found.remainder.modelled
+    source = tmp_path / "robot.toml"
+    source.write_text(ROBOT)
+    plain = write_model(source, robot, found.causes, tmp_path / "plain.toml")
+    made = write_model(
+        source, robot, found.causes, tmp_path / "new.toml", refit=found.refit, remainder=modelled
+    )
+    assert set(made.placed) - set(plain.placed) == {"remainder"}
+    assert bool(made.own) == (modelled.own_parameters == "re-fitted")
+    again = load_robot(made.path)
+    assert again.remainder is not None
+    at = Motion(
+        name="any",
+        time_s=np.arange(50) / RATE_HZ,
+        **{
+            field: np.random.default_rng(i).normal(size=(50, 2))
+            for i, field in enumerate(
+                ("position_rad", "velocity_rad_s", "acceleration_rad_s2", "load_nm")
+            )
+        },
+    )
+    np.testing.assert_array_equal(again.remainder.torque(at), modelled.model.torque(at))
+    settings = Settings(bootstrap=20, threads=1)
+    after = diagnose(again, fitted, validation=other, settings=settings)
+    # Errors are relative to the measured torque, here without the remainder: its own speeds tell how much that is.
+    speed = np.gradient(other[0].position_rad, 1 / RATE_HZ, axis=0)
+    still = replace(
+        at, time_s=other[0].time_s, velocity_rad_s=speed, **dict.fromkeys(_OTHERS, 0 * speed)
+    )
+    left = other[0].torque_nm - modelled.model.torque(still)
+    size = left.std(axis=0) / other[0].torque_nm.std(axis=0)
+    # Noise of the speed is below 1 % of it.
+    np.testing.assert_allclose(after.gap.before_per_axis * size, modelled.after_per_axis, rtol=0.02)
+    assert any("remainder of the robot file" in check for check in after.checks)
+    # Without a remainder the files are those of ever.
+    assert "remainder" not in plain.path.read_text()
+    twice = write_model(made.path, again, (), tmp_path / "twice.toml", remainder=modelled)
+    assert twice.left_out == ("remainder",)
+    assert "has one already" in twice.why["remainder"]
