@@ -4,6 +4,7 @@ mod accelerometers;
 mod document;
 mod effects;
 mod error;
+mod parents;
 mod reader;
 
 pub use error::RobotError;
