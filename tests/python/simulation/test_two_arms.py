@@ -31,7 +31,9 @@ def two_arms() -> Robot:
     tables = []
     for i, (name, parent, origin, axis, stiffness) in enumerate(_JOINTS):
         elastic = name.endswith("bend")
-        spring = "" if stiffness is None else f"stiffness = {stiffness}\ndamping = {stiffness * 2e-3}\n"
+        spring = (
+            "" if stiffness is None else f"stiffness = {stiffness}\ndamping = {stiffness * 2e-3}\n"
+        )
         drive = "[joint.drive]\ngear_ratio = 0.02\nmotor_inertia = 4e-4\nviscous_friction = 2e-3\n"
         tables.append(
             f'[[joint]]\nname = "{name}"\nparent = "{parent}"\nkind = "{"elastic" if elastic else "driven"}"\n'
