@@ -193,6 +193,8 @@ class EffectInfo(TypedDict):
 class JointEntry(TypedDict):
     """A joint: ``origin`` [m] and unit ``axis`` in the parent link's frame, and what it carries.
 
+    ``parent`` index of the joint whose link carries it, None on the base.
+
     ``spring`` stiffness, damping [Nm/rad, Nm s/rad] or [N/m, N s/m], None if rigid; ``link`` mass
     [kg], centre of mass [m] and inertia about it, xx yy zz xy xz yz [kg m^2], None if massless;
     ``drive`` joint angle per motor angle, motor inertia [kg m^2] and viscous friction
@@ -200,6 +202,7 @@ class JointEntry(TypedDict):
     """
 
     name: str
+    parent: int | None
     prismatic: bool
     origin: list[float]
     axis: list[float]

@@ -15,12 +15,15 @@ Array = NDArray[np.float64]
 
 
 def build(text: str) -> pin.Model:
-    """Return the chain of all joints; the frame of joint ``i`` is parallel to its parent's at zero angle."""
+    """Return the chain or tree of all joints; all frames are parallel at zero angle."""
     data: dict[str, Any] = tomllib.loads(text)
     model = pin.Model()
     model.gravity = pin.Motion(np.array(data["gravity"]), np.zeros(3))
     parent = 0
     for joint in data["joint"]:
+        if "parent" in joint:
+            base = joint["parent"] == "base"
+            parent = 0 if base else model.getJointId(joint["parent"])
         axis = np.array(joint["axis"])
         kind = (
             pin.JointModelPrismaticUnaligned

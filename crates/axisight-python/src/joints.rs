@@ -8,6 +8,7 @@ use pyo3::types::PyDict;
 pub fn joint_entry<'py>(py: Python<'py>, joint: &Joint) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
     out.set_item("name", &joint.name)?;
+    out.set_item("parent", joint.parent)?;
     out.set_item("prismatic", joint.motion == Motion::Prismatic)?;
     out.set_item("origin", joint.origin)?;
     out.set_item("axis", joint.axis)?;

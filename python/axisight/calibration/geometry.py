@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from axisight.display.summary import summarized
 from axisight.errors import InputError
 from axisight.robot import Robot
+from axisight.robot.branches import refuse_branches
 
 Array = NDArray[np.float64]
 
@@ -101,8 +102,9 @@ def nominal_geometry(
     ``tool_position_m`` and ``tool_rotation`` place the target in the frame of the last link.
     ``base_position_m`` and ``base_rotation`` place the robot's base in the frame of the measuring
     device. Positions are (3,) [m]; rotations are (3, 3), the identity by default. Raises InputError
-    naming the field.
+    naming the field, and RobotError for a robot with branches.
     """
+    refuse_branches(robot, "the calibration of one tool")
     joints = robot.joints
     stiffness = [np.inf if joint.spring is None else joint.spring.stiffness for joint in joints]
     axis = np.array([joint.axis for joint in joints])

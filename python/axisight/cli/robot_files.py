@@ -12,6 +12,7 @@ from axisight.cli.common import Force, errors, say
 from axisight.cli.model_options import Base, Load, ModelOptions, Tip
 from axisight.cli.robot import say_import
 from axisight.cli.screen import is_output
+from axisight.errors import InputError
 from axisight.robot_import import import_robot
 from axisight.storage import check_targets, write_whole
 
@@ -41,6 +42,13 @@ def import_command(
         ),
     ] = None,
     payload: Load = None,
+    whole_tree: Annotated[
+        bool,
+        typer.Option(
+            "--whole-tree",
+            help="Take all moving branches. Joints that follow other joints are locked at zero.",
+        ),
+    ] = False,
     force: Force = False,
 ) -> None:
     """Write a model file as a robot file, and say what could not be taken along."""
@@ -48,8 +56,10 @@ def import_command(
         out = None if is_output(out) else out
         given = [model, *(x for x in (drives,) if x)]
         check_targets({"-o": out}, inputs=given, replaces={"-o": ()}, force=force)
+        if whole_tree and tip is not None:
+            raise InputError(f"--whole-tree: expected no --tip beside it, got --tip {tip}")
         data = ModelOptions(base, tip, payload).drives(model, drives)
-        robot = import_robot(model, drives=data)
+        robot = import_robot(model, drives=data, whole_tree=whole_tree)
         if out is None:
             typer.echo(robot.toml, nl=False)
             return

@@ -13,6 +13,7 @@ from axisight.arguments import Real, number, one_of, reals, switch, whole
 from axisight.errors import InputError
 from axisight.paths.joint_path import JointPath, within_ranges
 from axisight.robot import Robot
+from axisight.robot.branches import refuse_branches
 
 # Newton steps to the next point of a path, and how exactly it is reached [m and rad].
 _STEPS = 50
@@ -50,9 +51,11 @@ def tool_path(
         them; its error falls with the fourth power of their distance.
 
     The solution is that of least joint motion from one position to the next (damped Newton steps).
-    Raises InputError for wrong arguments and for a position that the robot does not reach.
+    Raises InputError for wrong arguments and for a position that the robot does not reach, and RobotError for a
+    robot with branches, which has no one tool.
 
     """
+    refuse_branches(robot, "a path of the tool")
     start = reals("start_rad", start_rad, f"finite numbers of shape ({robot.n_axes},)", 1)
     given = reals("positions_m", positions_m, "finite numbers of shape (n, 3)", 2)
     if given.shape[1] != 3 or not len(given):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,14 +57,15 @@ class Drive:
 @summarized
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint of the chain with its link, its spring and its drive.
+    """A joint with its link, its spring and its drive.
 
     ``origin_m`` (3,) [m] and the unit vector ``axis`` (3,) are in the parent link's frame. ``spring`` is None
     for a rigid transmission, ``link`` is None for a massless link, ``drive`` is None for a joint without a
-    motor.
+    motor. ``parent`` is the index, from 0, of the joint whose link carries this one, None on the base.
     """
 
     name: str
+    parent: int | None
     prismatic: bool
     origin_m: Array
     axis: Array
@@ -77,6 +79,7 @@ def joint_of(entry: _core.JointEntry) -> Joint:
     spring, link, drive = entry["spring"], entry["link"], entry["drive"]
     return Joint(
         name=entry["name"],
+        parent=entry["parent"],
         prismatic=entry["prismatic"],
         origin_m=np.array(entry["origin"]),
         axis=np.array(entry["axis"]),
@@ -84,3 +87,17 @@ def joint_of(entry: _core.JointEntry) -> Joint:
         link=None if link is None else Link(link[0], np.array(link[1]), np.array(link[2])),
         drive=None if drive is None else Drive(*drive),
     )
+
+
+def moved_by_axis(joints: Sequence[_core.JointEntry], driven: int) -> list[str]:
+    """Return the names of a driven joint, by its index, and of elastic joints between it and the next axes."""
+    own: set[int | None] = {driven}
+    for i, joint in enumerate(joints):
+        if joint["parent"] in own and joint["drive"] is None:
+            own.add(i)
+    return [joint["name"] for i, joint in enumerate(joints) if i in own]
+
+
+def is_chain(joints: Sequence[_core.JointEntry]) -> bool:
+    """Whether every joint is on the link of the joint before it, and the first one on the base."""
+    return [joint["parent"] for joint in joints] == [None, *range(len(joints) - 1)]

@@ -24,7 +24,7 @@ from axisight.robot.accelerometer import (
     described_with,
 )
 from axisight.robot.axis_names import axis_number, effect_on
-from axisight.robot.description import Joint, joint_of
+from axisight.robot.description import Joint, is_chain, joint_of, moved_by_axis
 from axisight.robot.limits import JointLimits, limits_of
 from axisight.robot.notebook import page_of
 from axisight.robot.stated_remainder import described_with_remainder, stated_remainder
@@ -44,9 +44,9 @@ _SAMPLE_TIME = re.compile(r"^sample_time\s*=.*$", re.MULTILINE)
 class Robot:
     """A robot in the format ``axisight.robot/1`` or ``/2``, with the effects of its simulator.
 
-    Joint arrays run over all joints, driven and elastic, base to tip; axis
-    arrays over driven joints only. ``q`` [rad or m], ``v`` [rad/s or m/s], ``a`` [rad/s^2 or m/s^2] and
-    forces [Nm or N] may have shape (n_joints,) or (n, n_joints).
+    Joint arrays run over all joints, driven and elastic, parents first; axis arrays over driven joints only.
+    ``q`` [rad or m], ``v`` [rad/s or m/s], ``a`` [rad/s^2 or m/s^2] and forces [Nm or N] may have shape
+    (n_joints,) or (n, n_joints).
 
     ``core`` is the robot for functions of the compiled core; users need only the attributes and methods
     here. The robot's own `effects` act in every simulation, linearization and fit. An effect that is passed
@@ -108,7 +108,7 @@ class Robot:
 
     @property
     def joint_names(self) -> list[str]:
-        """Names of all joints, base to tip."""
+        """Names of all joints, parents first."""
         return self.core.joint_names
 
     @property
@@ -125,16 +125,20 @@ class Robot:
     def tolerances(self) -> dict[str, float]:
         """Tolerances of the own parameters (relative standard deviation [1]) that the description states.
 
-        Quantities are ``mass``, ``inertia_scale``, ``stiffness``, ``damping``, ``motor_inertia`` and
-        ``viscous_friction``. A controller of position targets also has its gains ``kp`` and ``kd``, a cascade
-        ``kv``, ``kp`` and ``ki``.
+        Quantities are ``mass``, ``inertia_scale``, ``stiffness``, ``damping``, ``motor_inertia``, ``viscous_friction``,
+        and the gains of a controller of position targets: ``kp`` and ``kd``, or ``kv``, ``kp`` and ``ki``.
         """
         return dict(self.core.tolerances)
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """All joints with link, spring and drive, base to tip, at the current parameters."""
+        """All joints with link, spring and drive, parents first, at the current parameters."""
         return tuple(joint_of(entry) for entry in self.core.joints())
+
+    @property
+    def is_chain(self) -> bool:
+        """Whether the robot is one chain; False if it has branches."""
+        return is_chain(self.core.joints())
 
     @property
     def accelerometers(self) -> tuple[Accelerometer, ...]:
@@ -175,15 +179,13 @@ class Robot:
         """Return the name of a parameter of an axis (``axis1.stiffness``), or None if there is none.
 
         ``axis`` is a number from 1 or the name of the joint that the axis drives. ``quantity`` belongs to a
-        joint (``stiffness``) or to a link (``mass``). The joint is that of the axis, or an elastic joint
-        between this axis and the next. Raises InputError for an axis that is not there.
+        joint (``stiffness``) or to a link (``mass``): that of the axis, or an elastic one between it and the
+        next ones. Raises InputError for an axis that is not there.
         """
         axis = self.axis_number(axis)
-        places = [*self.axis_joints, self.n_joints]
-        moved = self.joint_names[places[axis - 1] : places[axis]]
+        moved = moved_by_axis(self.core.joints(), self.axis_joints[axis - 1])
         known = self.parameters()
-        names = (f"{joint}.{quantity}" for joint in moved)
-        return next((name for name in names if name in known), None)
+        return next((x for joint in moved if (x := f"{joint}.{quantity}") in known), None)
 
     @property
     def axis_is_prismatic(self) -> list[bool]:
@@ -307,10 +309,7 @@ class Robot:
         return None if found is None else (found[0], np.array(found[1]))
 
     def with_velocity_feedforward(self, on: bool) -> Robot:
-        """Return the same robot with `velocity_feedforward` switched on or off.
-
-        Raises InputError unless the references of its controller are positions.
-        """
+        """Return the robot with `velocity_feedforward` on or off; raise InputError if it is told speeds."""
         return self._with_core(self.core.with_velocity_feedforward(on))
 
     def with_operating_point(self, angle_rad: ArrayLike) -> Robot:
@@ -544,9 +543,8 @@ class Robot:
     ) -> tuple[Array, Array, Array]:
         """Return A, B, C of ``x' = A x + B u``, ``phi = C x`` at rest at an operating point.
 
-        States are ``[phi, q, phi', q']``, inputs motor torques [Nm], outputs motor
-        angles [rad]; derivatives are exact (dual numbers). ``joint_angle_rad`` and ``effects`` are as in
-        `equilibrium`.
+        States are ``[phi, q, phi', q']``, inputs motor torques [Nm], outputs motor angles [rad]; derivatives
+        are exact (dual numbers). ``joint_angle_rad`` and ``effects`` are as in `equilibrium`.
         """
         at = None if joint_angle_rad is None else [float(a) for a in joint_angle_rad]
         return self.core.linearize(core_effects(self.placed(effects)), at)

@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.errors import MissingExtraError
+from axisight.errors import InputError, MissingExtraError
 from axisight.robot import Robot
 from axisight.robot.description import Joint
 from axisight.robot_export.dry_friction import joint_friction_nm
@@ -41,21 +41,15 @@ def mjcf(robot: Robot) -> str:
     - The inputs of the actuators are motor torques [Nm].
     - A massless link shares a body with the next link.
 
-    MJCF has no place for the controller and all other effects, such as ripples and backlash.
+    MJCF has no place for the controller and all other effects, such as ripples and backlash. Raises InputError
+    for a massless link with several joints on it, as a body of MuJoCo needs a mass.
     """
     root = ET.Element("mujoco", model=robot.name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="false")
     ET.SubElement(
         root, "option", gravity=_text(robot.gravity_m_s2), timestep=repr(robot.sample_time_s)
     )
-    body = ET.SubElement(root, "worldbody")
-    friction = joint_friction_nm(robot)
-    waiting: list[Joint] = []
-    for joint in robot.joints:
-        waiting.append(joint)
-        if joint.link is not None:
-            body = _body(body, waiting, friction)
-            waiting = []
+    _bodies(ET.SubElement(root, "worldbody"), robot)
     actuators = ET.SubElement(root, "actuator")
     for name, ratio, rigid in zip(
         robot.axis_names, robot.gear_ratio.tolist(), robot.axis_is_rigid, strict=True
@@ -64,6 +58,30 @@ def mjcf(robot: Robot) -> str:
         ET.SubElement(actuators, "motor", name=name, joint=driven, gear=repr(1.0 / ratio))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _bodies(world: ET.Element, robot: Robot) -> None:
+    """Append the bodies of a robot, each within the body that carries it; errors are those of `mjcf`."""
+    friction = joint_friction_nm(robot)
+    bodies: dict[int | None, ET.Element] = {None: world}
+    # Of joints with a massless link: the body that carries them, and the joints since that body.
+    waiting: dict[int | None, tuple[ET.Element, list[Joint]]] = {}
+    for i, joint in enumerate(robot.joints):
+        if joint.parent in bodies:
+            carrier, joints = bodies[joint.parent], [joint]
+        elif joint.parent in waiting:
+            carrier, before = waiting.pop(joint.parent)
+            joints = [*before, joint]
+        else:
+            assert joint.parent is not None  # the base is a body
+            raise InputError(
+                f"{robot.joint_names[joint.parent]}: expected a link with mass, as several joints are on it, got "
+                f"a massless one: a body of MuJoCo needs a mass"
+            )
+        if joint.link is None:
+            waiting[i] = carrier, joints
+        else:
+            bodies[i] = _body(carrier, joints, friction)
 
 
 def _body(parent: ET.Element, joints: Sequence[Joint], friction: dict[str, float]) -> ET.Element:

@@ -13,7 +13,7 @@ from axisight.robot_export.dry_friction import joint_friction_nm
 
 
 def to_pinocchio(robot: Robot) -> Any:
-    """Return a ``pinocchio.Model`` of the arm with all joints, driven and elastic, under the same names.
+    """Return a ``pinocchio.Model`` of the robot with all joints, driven and elastic, under the same names.
 
     Its ``rnea`` equals `Robot.inverse_dynamics`. Rotors are in ``rotorInertia`` [kg m^2, motor side] and
     ``rotorGearRatio`` (motor angle per joint angle). Viscous friction is in ``damping``, Coulomb friction in
@@ -28,7 +28,6 @@ def to_pinocchio(robot: Robot) -> Any:
     model.name = robot.name
     model.gravity.linear = robot.gravity_m_s2
     friction = joint_friction_nm(robot)
-    parent = 0
     for joint in robot.joints:
         kind = (
             pinocchio.JointModelPrismaticUnaligned
@@ -36,7 +35,9 @@ def to_pinocchio(robot: Robot) -> Any:
             else pinocchio.JointModelRevoluteUnaligned
         )
         placement = pinocchio.SE3(np.eye(3), joint.origin_m)
-        parent = model.addJoint(parent, kind(joint.axis), placement, joint.name)
+        # Joint 0 of Pinocchio is the base.
+        before = 0 if joint.parent is None else joint.parent + 1
+        parent = model.addJoint(before, kind(joint.axis), placement, joint.name)
         if joint.link is not None:
             xx, yy, zz, xy, xz, yz = joint.link.inertia_kg_m2
             inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -1,4 +1,4 @@
-"""The tree of rigid bodies in a model file, from which `chain` makes a serial chain."""
+"""The tree of rigid bodies in a model file, from which `chain` takes a chain or branches."""
 
 from __future__ import annotations
 
@@ -160,7 +160,8 @@ class Body:
     ``pose`` is the frame of the body in that of its parent, with the joint at zero. ``axis`` (3,) is the
     joint axis in the frame of the body. ``where`` is the place in the file, for messages. ``refused`` says
     why a chain cannot have its joint. If the body only stands for a joint, ``of`` is the body in the file
-    that the joint moves. ``bare`` means that another joint of that body follows.
+    that the joint moves. ``bare`` means that another joint of that body follows. ``follows`` is the name of a
+    joint that this joint follows.
     """
 
     name: str
@@ -176,6 +177,7 @@ class Body:
     refused: str = ""
     bare: bool = False
     of: str = ""
+    follows: str = ""
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""Make a serial chain from a tree of bodies: merge fixed joints, and refuse or lock other branches."""
+"""Cut a chain or a smaller tree out of a tree of bodies: merge fixed joints, lock other branches."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ChainJoint:
-    """A joint of the chain, in frames that are parallel to the base frame at zero angle.
+    """A joint, in frames that are parallel to the base frame at zero angle.
 
     ``origin_m`` (3,) [m] and ``axis`` (3,) are in the parent's frame, ``mass`` is in the frame of the joint.
     ``body`` is the body in the file; ``rotation`` (3, 3) is the orientation of its frame in the joint's.
+    ``parent`` is the index of the joint that carries it, None on the base.
     """
 
     body: Body
@@ -28,11 +29,12 @@ class ChainJoint:
     axis: Array
     mass: Mass | None
     rotation: Array
+    parent: int | None
 
 
 @dataclass(frozen=True)
 class Chain:
-    """A serial chain from a model file, with notes on how it was made.
+    """A chain, or a tree, of joints from a model file, with notes on how it was made.
 
     ``end`` is the pose of the last link's frame in the file, in the frame of the last joint. ``steps`` are
     the time steps of the simulator of the file. ``gravity_m_s2`` (3,) is the share ``gravity_share`` of the
@@ -48,47 +50,71 @@ class Chain:
     gravity_share: float = 1.0
     holds_weight: bool = False
 
+    @property
+    def is_chain(self) -> bool:
+        """Whether no joint but the last one is without a next joint."""
+        return all(joint.parent == (i - 1 if i else None) for i, joint in enumerate(self.joints))
+
 
 STANDARD_GRAVITY_M_S2 = 9.81
 
 
-def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Chain:
-    """Return the serial chain between two bodies of a tree.
+def chain_of(
+    tree: Tree,
+    base: str | None = None,
+    tip: str | Sequence[str] | None = None,
+    *,
+    whole_tree: bool = False,
+) -> Chain:
+    """Return the joints of a tree of bodies from one body on: a serial chain, or several branches.
 
-    ``base`` is the fixed body, by default the root. ``tip`` is the last body, by default the end of the only
-    moving branch. Bodies on fixed joints are merged with their parents. With a ``tip``, other moving branches
-    and everything beyond the tip are locked at zero; their masses stay.
+    ``base`` is the fixed body, by default the root. ``tip`` is the last body, or the last bodies of several
+    branches. By default it is the end of the only moving branch; with ``whole_tree``, the ends of all. Bodies
+    on fixed joints are merged with their parents. With a ``tip``, other moving branches and everything beyond
+    a tip are locked at zero; their masses stay. With ``whole_tree``, joints that follow another joint
+    are locked at zero.
 
-    Raises RobotError for bodies that are not there, several branches without a ``tip``, joints that a chain
-    cannot have, moving bodies without mass, and inertias that no body has.
+    Raises RobotError for bodies that are not there, several branches without a ``tip``, a ``tip`` beside
+    ``whole_tree``, joints that a robot cannot have, moving bodies without mass, and inertias that no body has.
     """
     root = next(iter(tree.bodies.values()))
-    for option, name in (("base", base), ("tip", tip)):
+    tips = [tip] if isinstance(tip, str) else list(tip or ())
+    if tips and whole_tree:
+        raise RobotError(
+            f"{root.where}: whole_tree: expected no tip beside it, got {_listed(tips)}"
+        )
+    for option, name in (("base", base), *(("tip", name) for name in tips)):
         if name is not None and name not in tree.bodies:
             near = get_close_matches(name, tree.bodies, n=5) or tree.bodies
             raise RobotError(
                 f"{root.where}: --{option}: expected a link, such as {_listed(near)}, got {name!r}"
             )
     first = root.name if base is None else base
-    last = _only_end(tree, first) if tip is None else tip
-    path = tree.path(last)
-    names = [body.name for body in path]
-    if first not in names:
-        raise RobotError(
-            f"{tree.bodies[first].where}: --base: expected a link between {names[0]!r} and the "
-            f"tip {last!r}, got {first!r}"
-        )
-    path = path[names.index(first) :]
-    joints, end, notes = _joints(tree, path)
+    if whole_tree:
+        tips = _ends(tree, first) or [first]
+    elif not tips:
+        tips = [_only_end(tree, first)]
+    chosen: dict[str, None] = {}
+    for name in tips:
+        path = [body.name for body in tree.path(name)]
+        if first not in path:
+            raise RobotError(
+                f"{tree.bodies[first].where}: --base: expected a link between {path[0]!r} and the "
+                f"tip {name!r}, got {first!r}"
+            )
+        chosen |= dict.fromkeys(path[path.index(first) :])
+    cut = _Cut(tree, first, frozenset(chosen), locks_followers=whole_tree)
+    joints = cut.joints(tips)
     gravity = tree.gravity_m_s2
     if gravity is None:
         gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
+    notes = (*tree.notes, *cut.notes())
     return Chain(
         tree.name,
         tuple(joints),
-        end,
+        cut.end(tips[-1]),
         gravity * tree.gravity_share,
-        (*tree.notes, *notes),
+        notes,
         tree.steps,
         tree.gravity_share,
         tree.holds_weight,
@@ -120,7 +146,8 @@ def _only_end(tree: Tree, first: str) -> str:
             f"branches: give the last link of the one that is meant, --tip (of diagnose, "
             f"check, columns guess, explore, simulate, excite and robot import) or "
             f"tip = '...' in the drive data beside the file (they end at "
-            f"{_listed(shown)} and part at {trunk[-1]}); other branches are locked at zero"
+            f"{_listed(shown)} and part at {trunk[-1]}); other branches are locked at zero. "
+            f"whole_tree = true there, or robot import --whole-tree, takes all"
         )
     return (tree.bodies[ends[0]].of or ends[0]) if ends else first
 
@@ -146,43 +173,107 @@ def _ends(tree: Tree, first: str) -> list[str]:
     return out
 
 
-def _joints(tree: Tree, path: Sequence[Body]) -> tuple[list[ChainJoint], Pose, list[str]]:
-    """Return the moving joints along a path, the last body's pose in the last joint's frame, and notes."""
-    chosen = {body.name for body in path}
-    # Start from the orientation in the root frame, in which the file states gravity.
-    here = Pose(_from_root(tree, path[0]).rotation, np.zeros(3))
-    locked: list[str] = []
-    carried: list[Body] = []
-    # Masses that move with the previous joint; those fixed to the base do not matter.
-    with_last: list[Mass] = []
-    moving: list[tuple[Body, Pose, list[Mass]]] = []
-    for body in path[1:]:
-        here = here @ body.pose
-        masses = _carried(tree, body, here, chosen, locked, carried)
-        if body.motion == "fixed":
-            with_last += masses
-            continue
-        if body.refused or body.motion == "other":
-            raise RobotError(f"{body.where}: {body.refused}")
-        with_last = masses
-        moving.append((body, here, with_last))
-    if not moving:
-        raise RobotError(
-            f"{path[-1].where}: expected at least one revolute, continuous or prismatic joint between "
-            f"{path[0].name!r} and {path[-1].name!r}, got none"
-        )
-    joints: list[ChainJoint] = []
-    before = np.zeros(3)
-    for body, at, masses in moving:
-        mass = joined(m.at(Pose(np.eye(3), -at.origin)) for m in masses)
-        _check(body, mass)
-        joints.append(
-            ChainJoint(body, at.origin - before, at.rotation @ body.axis, mass, at.rotation)
-        )
-        before = at.origin
-    notes = [f"locked at zero, masses carried along: {_listed(locked)}"] if locked else []
-    notes += [said for body in carried if (said := _impossible(body))]
-    return joints, Pose(here.rotation, here.origin - before), notes
+class _Cut:
+    """The part of a tree between the body ``first`` and some tips: the bodies ``chosen``.
+
+    With ``locks_followers``, joints that follow other joints are locked at zero, not refused.
+    """
+
+    def __init__(
+        self, tree: Tree, first: str, chosen: frozenset[str], *, locks_followers: bool
+    ) -> None:
+        self.tree, self.first, self.chosen = tree, first, chosen
+        self.locks_followers = locks_followers
+        self.locked: list[str] = []
+        self.following: list[str] = []
+        self.carried: list[Body] = []
+        # Start from the orientation in the root frame, in which the file states gravity.
+        start = Pose(_from_root(tree, tree.bodies[first]).rotation, np.zeros(3))
+        self.poses = {first: start}
+        # The index of the joint that moves a body, None on the base.
+        self.moved_by: dict[str, int | None] = {first: None}
+
+    def joints(self, tips: Sequence[str]) -> list[ChainJoint]:
+        """Return the moving joints, parents before children; raise RobotError as `chain_of`."""
+        moving: list[tuple[Body, int | None, list[Mass]]] = []
+        for body in self._below_first():
+            assert body.parent is not None  # only the root has none
+            here = self.poses[body.parent] @ body.pose
+            parent = self.moved_by[body.parent]
+            masses = self._carried(body, here)
+            self.poses[body.name], self.moved_by[body.name] = here, parent
+            if self._is_fixed(body):
+                # Masses that are fixed to the base do not matter.
+                if parent is not None:
+                    moving[parent][2].extend(masses)
+                continue
+            if body.refused or body.motion == "other":
+                raise RobotError(f"{body.where}: {body.refused}")
+            self.moved_by[body.name] = len(moving)
+            moving.append((body, parent, masses))
+        if not moving:
+            tip = tips[-1]
+            raise RobotError(
+                f"{self.tree.bodies[tip].where}: expected at least one revolute, continuous or prismatic joint "
+                f"between {self.first!r} and {tip!r}, got none"
+            )
+        out: list[ChainJoint] = []
+        for body, parent, masses in moving:
+            at = self.poses[body.name]
+            before = np.zeros(3) if parent is None else self.poses[moving[parent][0].name].origin
+            mass = joined(m.at(Pose(np.eye(3), -at.origin)) for m in masses)
+            _check(body, mass)
+            axis = at.rotation @ body.axis
+            out.append(ChainJoint(body, at.origin - before, axis, mass, at.rotation, parent))
+        self._moving = [body for body, _, _ in moving]
+        return out
+
+    def end(self, tip: str) -> Pose:
+        """Return the pose of a tip in the frame of the last joint that moves it."""
+        here, mover = self.poses[tip], self.moved_by[tip]
+        before = np.zeros(3) if mover is None else self.poses[self._moving[mover].name].origin
+        return Pose(here.rotation, here.origin - before)
+
+    def notes(self) -> list[str]:
+        """Return notes on locked joints and on impossible inertias."""
+        out = []
+        if self.locked:
+            out.append(f"locked at zero, masses carried along: {_listed(self.locked)}")
+        if self.following:
+            out.append(
+                f"locked at zero, as they follow other joints: {_listed(self.following)}; "
+                f"couplings of joints are left out"
+            )
+        return out + [said for body in self.carried if (said := _impossible(body))]
+
+    def _below_first(self) -> list[Body]:
+        """Return the chosen bodies without the first one, every branch from base to tip."""
+        out: list[Body] = []
+        todo = [self.first]
+        while todo:
+            name = todo.pop()
+            if name != self.first:
+                out.append(self.tree.bodies[name])
+            below = [b.name for b in self.tree.children(name) if b.name in self.chosen]
+            todo += reversed(below)
+        return out
+
+    def _is_fixed(self, body: Body) -> bool:
+        if body.follows and self.locks_followers:
+            self.following.append(body.joint)
+            return True
+        return body.motion == "fixed"
+
+    def _carried(self, body: Body, here: Pose) -> list[Mass]:
+        """Return the masses of a body and of its branches that are not chosen, in the base frame."""
+        out = [] if body.mass is None else [body.mass.at(here)]
+        self.carried.append(body)
+        for child in self.tree.children(body.name):
+            if child.name not in self.chosen:
+                if child.motion != "fixed":
+                    self.locked.append(child.joint)
+                out += self._carried(child, here @ child.pose)
+        return out
 
 
 def _from_root(tree: Tree, body: Body) -> Pose:
@@ -190,28 +281,6 @@ def _from_root(tree: Tree, body: Body) -> Pose:
     for one in tree.path(body.name):
         pose = pose @ one.pose
     return pose
-
-
-def _carried(
-    tree: Tree,
-    body: Body,
-    here: Pose,
-    chosen: set[str],
-    locked: list[str],
-    carried: list[Body],
-) -> list[Mass]:
-    """Return the masses of a body and of all its branches outside the chain, in the base frame.
-
-    The names of the joints that are thereby locked go to ``locked``, and all these bodies to ``carried``.
-    """
-    out = [] if body.mass is None else [body.mass.at(here)]
-    carried.append(body)
-    for child in tree.children(body.name):
-        if child.name not in chosen:
-            if child.motion != "fixed":
-                locked.append(child.joint)
-            out += _carried(tree, child, here @ child.pose, chosen, locked, carried)
-    return out
 
 
 # Moments with three digits are off by up to 0.5 % each, so those of a plate, where the largest is the sum of

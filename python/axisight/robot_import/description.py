@@ -45,12 +45,19 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
             )
     drives, by_class = with_rotors(chain.joints, drives)
     joints = list(chain.joints)
+    if drives.payload is not None and not chain.is_chain:
+        raise RobotError(
+            "drive data: payload: expected a robot without branches, which has one last link, got one with "
+            "branches: add the load to the mass of a link in the model file"
+        )
     last = _loaded(joints[-1].mass, drives.payload, chain.end)
     tables, effects = [], []
     for number, joint in enumerate(joints, start=1):
         drive = drives.joint.get(joint.body.joint, JointDrive())
         mass = last if joint is joints[-1] else joint.mass
         table, ratio = _joint(joint, mass, drive)
+        if joint.parent != (number - 2 if number > 1 else None):
+            table["parent"] = "base" if joint.parent is None else names[joint.parent]
         tables.append(table)
         spring = joint.body.drive.spring
         if spring > 0:

@@ -60,14 +60,16 @@ class DriveData(_Strict):
     """The content of the file; every key is optional.
 
     ``robot_class`` (key ``class``) selects typical rotors for joints without one. ``base`` and ``tip`` are
-    the first and last link of the chain. ``sample_time`` is in s, ``position_noise_std`` in rad, motor-side.
+    the first and last link of the chain; several last links are those of branches. ``whole_tree`` takes all
+    branches. ``sample_time`` is in s, ``position_noise_std`` in rad, motor-side.
     ``operating_point`` (n_axes,) [rad or m] are the angles of the driven joints. ``controller`` and
     ``tolerances`` are as in a robot file. ``joint`` holds the drives by joint name.
     """
 
     robot_class: RobotClass | None = Field(default=None, alias="class")
     base: str | None = None
-    tip: str | None = None
+    tip: str | list[str] | None = None
+    whole_tree: bool = False
     sample_time: _Positive | None = None
     position_noise_std: _NotNegative | None = None
     operating_point: list[_Finite] | None = None

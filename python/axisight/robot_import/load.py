@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,8 @@ def import_robot(
     source: Path | str | Any,
     *,
     base: str | None = None,
-    tip: str | None = None,
+    tip: str | Sequence[str] | None = None,
+    whole_tree: bool = False,
     drives: DriveData | Path | str | None = None,
     sample_time_s: float | None = None,
 ) -> Robot:
@@ -56,7 +58,10 @@ def import_robot(
     source : URDF (``.urdf``, or ``.xml`` with <robot>), MJCF (``.xml``, ``.mjcf``), a table of Denavit
         and Hartenberg (``.csv``, ``.toml``), or a ``pinocchio.Model``.
     base, tip : first and last link of the chain (bodies in MJCF, joints of a ``pinocchio.Model``). If neither
-        they nor the drive data state them, these are the root and the end of the only moving branch.
+        they nor the drive data state them, these are the root and the end of the only moving branch. Several
+        tips, as a list, give a robot with branches.
+    whole_tree : take all moving branches; joints that follow other joints are locked at zero, with a note in
+        the robot file. By default, a file with several branches needs a ``tip``.
     drives : drive data, or their TOML file; by default ``arm.drives.toml`` beside ``arm.urdf``, if there is
         one. Without drive data, gears are rigid with the ratio of the file or 1, and rotors and friction are
         those of the file. There is then a controller only if every joint of an MJCF has position targets.
@@ -65,7 +70,7 @@ def import_robot(
     Links on fixed joints are merged with their parents. As in every robot file, frames are parallel to the
     base frame at zero angle. Joint angles are those of the file.
 
-    Raises RobotError, with file, line and element, for everything that is not one serial chain. Raises
+    Raises RobotError, with file, line and element, for everything that is no chain or tree of such joints. Raises
     MissingExtraError for MJCF if MuJoCo is not installed.
 
     """
@@ -77,7 +82,7 @@ def import_robot(
     # Drive data change what the file says.
     unchanged = isinstance(source, str | Path) and drives == DriveData()
     alone = Path(source).resolve() if unchanged else None
-    tree, chain = bodies_and_chain(source, drives, base=base, tip=tip)
+    tree, chain = bodies_and_chain(source, drives, base=base, tip=tip, whole_tree=whole_tree)
 
     def built(step_s: float | None) -> Robot:
         stated = drives if step_s is None else drives.model_copy(update={"sample_time": step_s})
@@ -127,11 +132,18 @@ def felt_inertia(robot: Robot) -> NDArray[np.float64]:
 
 
 def bodies_and_chain(
-    source: Path | str | Any, drives: DriveData, *, base: str | None = None, tip: str | None = None
+    source: Path | str | Any,
+    drives: DriveData,
+    *,
+    base: str | None = None,
+    tip: str | Sequence[str] | None = None,
+    whole_tree: bool = False,
 ) -> tuple[Tree, Chain]:
-    """Return the bodies of a model, and their serial chain; arguments and errors as in `import_robot`."""
+    """Return the bodies of a model, and its chain or tree; arguments and errors as in `import_robot`."""
     tree = _tree(Path(source)) if isinstance(source, str | Path) else tree_of(source)
-    return tree, chain_of(tree, base or drives.base, tip or drives.tip)
+    tip = tip or (None if whole_tree else drives.tip)
+    whole_tree = whole_tree or (drives.whole_tree and not tip)
+    return tree, chain_of(tree, base or drives.base, tip, whole_tree=whole_tree)
 
 
 def _tree(path: Path) -> Tree:

@@ -149,6 +149,7 @@ def _body(
         _drive(joint, ratios.get(joint.attributes["name"], 1.0)),
         _limits(joint, kind),
         refused,
+        follows="" if mimic is None else mimic.attributes.get("joint", "?"),
     )
 
 

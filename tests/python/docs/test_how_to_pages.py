@@ -107,3 +107,10 @@ def test_short_examples(page, snippets):
     assert names["robot"].n_axes == 3
     if "run" in names:
         assert names["run"].attrs["status"] == "completed"
+
+
+def test_branches(snippets, capsys):
+    (code,) = snippets("branches", "python")
+    exec(code, {})
+    told = [line.split("# ")[1] for line in code.splitlines() if line.startswith("print(")]
+    assert capsys.readouterr().out.splitlines() == told

@@ -17,6 +17,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     shown_by: &[Experiment::Poses],
     formula: Formula::RIGID_BODY,
     scales: Some(Scales::Every),
+    needs_chain: true,
     parameters: &[shift("x_m"), shift("y_m"), shift("z_m")],
     ..EffectInfo::PLAIN
 };

@@ -33,6 +33,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
     scales: Some(Scales::Carriers),
     // Every arm carries loads, so a load is more common than an error in a link.
     usual_odds: 3.0,
+    needs_chain: true,
     parameters: &[
         ParameterInfo {
             name: "mass_kg",

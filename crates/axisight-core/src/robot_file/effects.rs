@@ -73,6 +73,10 @@ fn read_effect(
     };
     keys.extend(info.parameters.iter().map(|p| p.name));
     section.only(&keys)?;
+    if info.needs_chain && !robot.is_chain() {
+        let expected = "an effect of robots with branches: this one needs a chain";
+        return Err(entry.refuse(expected.to_owned()));
+    }
     Ok(EffectSetting {
         name: name.to_owned(),
         place: read_place(section, info, robot)?,
@@ -130,20 +134,11 @@ fn axis_number(
         let expected = "an axis with a compliant transmission".to_owned();
         return Err(entry.invalid(expected, format!("axis {} (rigid)", index + 1)));
     }
-    if info.acts == Acts::Arm && !has_link(robot, index) {
+    if info.acts == Acts::Arm && robot.link_of_axis(index).is_none() {
         let expected = "an axis that moves a link with mass".to_owned();
         return Err(entry.invalid(expected, format!("axis {} (massless)", index + 1)));
     }
     Ok(index)
-}
-
-/// Whether a link moves with an axis but not with the next axis.
-fn has_link(robot: &RobotDescription, index: usize) -> bool {
-    let places: Vec<usize> = robot.driven().map(|(place, ..)| place).collect();
-    let end = places.get(index + 1).copied().unwrap_or(robot.joints.len());
-    robot.joints[places[index]..end]
-        .iter()
-        .any(|joint| joint.link.is_some())
 }
 
 fn read_parameters(section: &Section, info: &EffectInfo) -> Result<Vec<f64>, RobotError> {

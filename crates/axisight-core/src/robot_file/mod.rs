@@ -5,6 +5,7 @@ mod document;
 mod effects;
 mod error;
 mod limits;
+mod parents;
 mod reader;
 
 pub use error::RobotError;

@@ -11,6 +11,7 @@ use super::document::{Entry, Section, line_at, one_of};
 use super::effects::{read_effects, read_tolerances};
 use super::error::RobotError;
 use super::limits::check_limits;
+use super::parents::read_parent;
 use crate::robot::MOST_JOINTS;
 use crate::robot::description::{
     Bound, Compliance, Controller, Drive, Joint, Known, Link, Motion, RobotDescription, Stepped,
@@ -47,8 +48,8 @@ const JOINT_KEYS: &[&str] = &[
     "link",
     "drive",
 ];
-/// Key of a joint in version 2 only.
-const NEWER_JOINT_KEY: &str = "limits";
+/// Keys of version 2 only.
+const NEWER_JOINT_KEYS: &[&str] = &["limits", "parent"];
 const LINK_KEYS: &[&str] = &["mass", "com", "inertia"];
 const DRIVE_KEYS: &[&str] = &["gear_ratio", "motor_inertia", "viscous_friction"];
 
@@ -83,10 +84,7 @@ pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
         name,
         gravity,
         sample_time,
-        joints: sections
-            .iter()
-            .map(|section| read_named_joint(section, version))
-            .collect::<Result<_, _>>()?,
+        joints: read_joints(&sections, version)?,
         controller: Controller::None,
         position_noise_std: 0.0,
         operating_point: Vec::new(),
@@ -158,19 +156,31 @@ fn check_chain(
     Ok(())
 }
 
-fn read_named_joint(section: &Section, version: usize) -> Result<Joint, RobotError> {
+fn read_joints(sections: &[Section], version: usize) -> Result<Vec<Joint>, RobotError> {
+    let mut joints = Vec::with_capacity(sections.len());
+    for section in sections {
+        joints.push(read_named_joint(section, &joints, version)?);
+    }
+    Ok(joints)
+}
+
+fn read_named_joint(
+    section: &Section,
+    before: &[Joint],
+    version: usize,
+) -> Result<Joint, RobotError> {
     let name = section.find("name").and_then(|entry| entry.value.as_str());
-    read_joint(section, version).map_err(|error| match name {
+    read_joint(section, before, version).map_err(|error| match name {
         Some(name) => error.of_joint(name),
         None => error,
     })
 }
 
-fn read_joint(section: &Section, version: usize) -> Result<Joint, RobotError> {
+fn read_joint(section: &Section, before: &[Joint], version: usize) -> Result<Joint, RobotError> {
     if version == 1 {
         section.only(JOINT_KEYS)?;
     } else {
-        section.only(&[JOINT_KEYS, &[NEWER_JOINT_KEY]].concat())?;
+        section.only(&[JOINT_KEYS, NEWER_JOINT_KEYS].concat())?;
     }
     let kinds = [("driven", true), ("elastic", false)];
     let motions = [
@@ -199,11 +209,12 @@ fn read_joint(section: &Section, version: usize) -> Result<Joint, RobotError> {
         refuse_drive(section)?;
         None
     };
-    if let Some(limits) = section.find(NEWER_JOINT_KEY) {
+    if let Some(limits) = section.find("limits") {
         check_limits(&limits, motion, driven)?;
     }
     Ok(Joint {
         name,
+        parent: read_parent(section, before)?,
         motion,
         origin,
         axis,

@@ -1,4 +1,4 @@
-//! One sweep over the chain: the effect of each link's parameters on each joint.
+//! One sweep over the chain or tree: the effect of each link's parameters on each joint.
 //!
 //! All quantities are in the frame of the present link. Let w, e and a be the angular velocity, the
 //! angular acceleration and the acceleration (minus gravity) of this frame. The link parameters m,
@@ -19,6 +19,7 @@ pub const LINK_PARAMETERS: usize = 10;
 /// Geometry of one joint.
 #[derive(Debug, Clone)]
 pub(super) struct Segment {
+    pub(super) parent: Option<usize>,
     motion: Motion,
     axis: [f64; 3],
     origin: [f64; 3],
@@ -27,6 +28,7 @@ pub(super) struct Segment {
 impl From<&Joint> for Segment {
     fn from(joint: &Joint) -> Self {
         Self {
+            parent: joint.parent,
             motion: joint.motion,
             axis: joint.axis,
             origin: joint.origin,
@@ -34,22 +36,65 @@ impl From<&Joint> for Segment {
     }
 }
 
-/// The chain, prepared for the sweep.
+/// The chain or tree, prepared for the sweep.
 #[derive(Debug, Clone)]
 pub(super) struct Geometry {
     pub(super) gravity: [f64; 3],
     pub(super) segments: Vec<Segment>,
-    /// Joints whose links have mass, in chain order.
+    /// Joints whose links have mass, in order.
     pub(super) links: Vec<usize>,
+    /// Where joints do not sit on the link before them; `None` for a chain.
+    pub(super) tree: Option<Tree>,
+}
+
+/// The branches of a tree.
+#[derive(Debug, Clone)]
+pub(super) struct Tree {
+    /// The joints that move each link, from the base to it.
+    pub(super) paths: Vec<Vec<usize>>,
+    /// Whether each link carries a joint that does not follow it directly.
+    pub(super) is_fork: Vec<bool>,
+}
+
+impl Tree {
+    /// The branches of `joints`; `None` if there are none.
+    fn of(joints: &[Segment]) -> Option<Self> {
+        let mut paths: Vec<Vec<usize>> = Vec::with_capacity(joints.len());
+        let mut is_fork = vec![false; joints.len()];
+        let mut is_chain = true;
+        for (i, joint) in joints.iter().enumerate() {
+            let mut path = joint.parent.map_or_else(Vec::new, |p| paths[p].clone());
+            path.push(i);
+            paths.push(path);
+            if joint.follows(i) {
+                continue;
+            }
+            is_chain = false;
+            if let Some(parent) = joint.parent {
+                is_fork[parent] = true;
+            }
+        }
+        (!is_chain).then_some(Self { paths, is_fork })
+    }
 }
 
 impl Geometry {
     pub(super) fn new(robot: &RobotDescription) -> Self {
         let loaded = |(i, joint): (usize, &Joint)| joint.link.is_some().then_some(i);
+        let segments: Vec<Segment> = robot.joints.iter().map(Segment::from).collect();
         Self {
             gravity: robot.gravity,
-            segments: robot.joints.iter().map(Segment::from).collect(),
+            tree: Tree::of(&segments),
+            segments,
             links: robot.joints.iter().enumerate().filter_map(loaded).collect(),
+        }
+    }
+
+    /// Whether joint `joint` moves link `link`.
+    pub(super) fn moves(&self, joint: usize, link: usize) -> bool {
+        match &self.tree {
+            None => joint <= link,
+            Some(tree) => tree.paths[link].contains(&joint),
         }
     }
 }
@@ -122,8 +167,12 @@ struct Unit<S> {
 /// Scratch memory of a sweep.
 #[derive(Debug, Clone)]
 pub(super) struct Sweep<S> {
+    /// Unit motions of the joints that move the present link, from the base to it.
     units: Vec<Unit<S>>,
-    /// Entry `[(link * n_joints + joint) * 10 + parameter]`. Joints beyond a link stay zero.
+    /// Unit motions and frames of the links that carry later joints, by link. Empty for a chain.
+    forks: Vec<(Vec<Unit<S>>, Frame<S>)>,
+    /// Entry `[(link * n_joints + joint) * 10 + parameter]`. Joints that do not move a link stay
+    /// zero.
     pub(super) cells: Vec<S>,
 }
 
@@ -132,6 +181,10 @@ impl<S: Scalar> Sweep<S> {
         let n = geometry.segments.len();
         Self {
             units: Vec::with_capacity(n),
+            forks: match geometry.tree {
+                None => Vec::new(),
+                Some(_) => vec![(Vec::new(), Frame::base(geometry)); n],
+            },
             cells: vec![S::zero(); geometry.links.len() * n * LINK_PARAMETERS],
         }
     }
@@ -141,14 +194,23 @@ impl<S: Scalar> Sweep<S> {
     pub(super) fn run(&mut self, geometry: &Geometry, motion: &[JointMotion<S>]) {
         let n = geometry.segments.len();
         self.units.clear();
-        let mut frame = Frame {
-            rate: Vec3::zero(),
-            growth: Vec3::zero(),
-            acceleration: Vec3::constant(geometry.gravity).negate(),
-        };
+        let mut frame = Frame::base(geometry);
         let mut links = geometry.links.iter().peekable();
         let mut blocks = self.cells.chunks_exact_mut(n * LINK_PARAMETERS);
         for (i, (segment, at)) in geometry.segments.iter().zip(motion).enumerate() {
+            if geometry.tree.is_some() && !segment.follows(i) {
+                frame = match segment.parent {
+                    None => {
+                        self.units.clear();
+                        Frame::base(geometry)
+                    }
+                    Some(parent) => {
+                        let (units, frame) = &self.forks[parent];
+                        self.units.clone_from(units);
+                        *frame
+                    }
+                };
+            }
             let turn = Turn::new(segment, at.q);
             let offset = segment.offset(at.q);
             for unit in &mut self.units {
@@ -171,17 +233,36 @@ impl<S: Scalar> Sweep<S> {
             if links.next_if_eq(&&i).is_some()
                 && let Some(block) = blocks.next()
             {
-                let cells = block.chunks_exact_mut(LINK_PARAMETERS);
                 let stretch = frame.stretch();
-                for (unit, cells) in self.units.iter().zip(cells) {
-                    frame.columns(&stretch, unit, cells);
+                if let Some(tree) = &geometry.tree {
+                    for (unit, joint) in self.units.iter().zip(&tree.paths[i]) {
+                        let cells = &mut block[joint * LINK_PARAMETERS..][..LINK_PARAMETERS];
+                        frame.columns(&stretch, unit, cells);
+                    }
+                } else {
+                    let cells = block.chunks_exact_mut(LINK_PARAMETERS);
+                    for (unit, cells) in self.units.iter().zip(cells) {
+                        frame.columns(&stretch, unit, cells);
+                    }
                 }
+            }
+            if let Some(tree) = &geometry.tree
+                && tree.is_fork[i]
+            {
+                let (units, kept) = &mut self.forks[i];
+                units.clone_from(&self.units);
+                *kept = frame;
             }
         }
     }
 }
 
 impl Segment {
+    /// Whether this joint, the one with index `i`, sits on the link before it.
+    pub(super) fn follows(&self, i: usize) -> bool {
+        self.parent == i.checked_sub(1)
+    }
+
     /// Position of the link's origin in the parent's axes.
     #[inline(always)]
     pub(super) fn offset<S: Scalar>(&self, q: S) -> Vec3<S> {
@@ -218,6 +299,15 @@ struct Frame<S> {
 }
 
 impl<S: Scalar> Frame<S> {
+    /// The base, which gravity accelerates.
+    fn base(geometry: &Geometry) -> Self {
+        Self {
+            rate: Vec3::zero(),
+            growth: Vec3::zero(),
+            acceleration: Vec3::constant(geometry.gravity).negate(),
+        }
+    }
+
     #[inline(always)]
     fn step(&mut self, segment: &Segment, turn: &Turn<S>, offset: &Vec3<S>, at: &JointMotion<S>) {
         let swing = self.rate.cross(offset);

@@ -1,4 +1,4 @@
-//! The energy of a chain, linear in the same parameters (thesis (4.3)).
+//! The energy of a chain or tree, linear in the same parameters (thesis (4.3)).
 
 use super::chain::LINK_PARAMETERS;
 use super::evaluate::{LANES, Lane, Regressor};
@@ -50,13 +50,21 @@ impl Regressor {
         let last = (q.len() / n).saturating_sub(1);
         let lanes =
             |x: &[f64], j: usize| Lane::from_lanes(|lane| x[(first + lane).min(last) * n + j]);
-        let mut rate = Vec3::<Lane>::zero();
-        let mut speed = Vec3::zero();
-        // Gravity in link axes, and its work between the base and the link's origin.
-        let mut gravity = Vec3::constant(self.geometry.gravity);
-        let mut fall = Lane::zero();
+        let base = Reached {
+            rate: Vec3::zero(),
+            speed: Vec3::zero(),
+            gravity: Vec3::constant(self.geometry.gravity),
+            fall: Lane::zero(),
+        };
+        let mut reached = vec![base; n];
         let mut blocks = out.chunks_exact_mut(LINK_PARAMETERS);
         for (j, segment) in self.geometry.segments.iter().enumerate() {
+            let Reached {
+                mut rate,
+                mut speed,
+                mut gravity,
+                mut fall,
+            } = segment.parent.map_or(base, |parent| reached[parent]);
             let position = lanes(q, j);
             let (turn, offset) = (segment.turn(position), segment.offset(position));
             let (own_turn, own_shift) = segment.unit();
@@ -67,6 +75,12 @@ impl Regressor {
             let at = lanes(v, j);
             rate = own_turn.scale_add(at, &rate);
             speed = own_shift.scale_add(at, &speed);
+            reached[j] = Reached {
+                rate,
+                speed,
+                gravity,
+                fall,
+            };
             if !self.links().contains(&j) {
                 continue;
             }
@@ -88,4 +102,14 @@ impl Regressor {
             block.copy_from_slice(&values);
         }
     }
+}
+
+/// What the sweep outwards knows of a link, in its axes.
+#[derive(Debug, Clone, Copy)]
+struct Reached {
+    rate: Vec3<Lane>,
+    speed: Vec3<Lane>,
+    gravity: Vec3<Lane>,
+    /// Work of gravity per mass between the base and the link's origin.
+    fall: Lane,
 }

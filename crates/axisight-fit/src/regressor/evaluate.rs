@@ -34,7 +34,7 @@ pub(super) struct Entry {
     extra: Option<(usize, f64)>,
 }
 
-/// The regressor of a chain.
+/// The regressor of a chain or tree.
 #[derive(Debug, Clone)]
 pub struct Regressor {
     pub(super) geometry: Geometry,
@@ -245,7 +245,7 @@ fn entries(geometry: &Geometry, r: usize, weights: &[f64], extras: &[Extra]) -> 
         let felt: Vec<(usize, f64)> = weights
             .iter()
             .enumerate()
-            .filter(|(joint, w)| joint <= link && **w != 0.0)
+            .filter(|(joint, w)| geometry.moves(*joint, *link) && **w != 0.0)
             .map(|(joint, w)| (joint, *w))
             .collect();
         if felt.is_empty() {

@@ -227,7 +227,7 @@ impl<'a> Linearizer<'a> {
 
     /// Gravity stiffness `dg/dq`, row-major.
     ///
-    /// For `i <= j` the entry is `-gravity . (a_i x (a_j x s_j))`, with the axes `a` and the first
+    /// For a joint `i` that is `j` or carries it, the entry is `-gravity . (a_i x (a_j x s_j))`, with the axes `a` and the first
     /// moment `s_j` of all links beyond joint `j` about that joint. For a prismatic joint, `a_j`
     /// times the mass beyond it replaces `a_j x s_j`.
     fn gravity_stiffness<S: Scalar>(&self, chain: &Chain<S>, q: &[S]) -> Vec<S> {
@@ -235,12 +235,17 @@ impl<'a> Linearizer<'a> {
         let poses = chain.poses(q);
         let gravity = Vec3::<S>::constant(self.robot.gravity);
         let mut out = vec![S::zero(); n * n];
-        let (mut mass, mut first) = (S::zero(), Vec3::<S>::zero());
+        let mut beyond = vec![(S::zero(), Vec3::<S>::zero()); n];
         for j in (0..n).rev() {
+            let (mut mass, mut first) = beyond[j];
             if let Some(body) = &chain.joints[j].body {
                 let com = poses[j].rotation.apply(&Vec3(body.com)) + poses[j].position;
                 mass += body.mass;
                 first += com.scale(body.mass);
+            }
+            if let Some(parent) = chain.joints[j].parent {
+                beyond[parent].0 += mass;
+                beyond[parent].1 += first;
             }
             let push = match self.motion[j] {
                 Motion::Revolute => poses[j]
@@ -248,7 +253,7 @@ impl<'a> Linearizer<'a> {
                     .cross(&(first - poses[j].position.scale(mass))),
                 Motion::Prismatic => poses[j].axis.scale(mass),
             };
-            for i in 0..=j {
+            for i in chain.path(j) {
                 let still = i == j && self.motion[j] == Motion::Prismatic;
                 if still || self.motion[i] == Motion::Prismatic {
                     continue;

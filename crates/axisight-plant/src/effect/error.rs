@@ -68,3 +68,15 @@ pub enum EffectError {
         got: f64,
     },
 }
+
+impl EffectError {
+    /// Error: effect `effect` needs a robot without branches.
+    pub fn on_tree(effect: &'static str) -> Self {
+        Self::Lacking {
+            effect,
+            expected: "a robot without branches (link_mass and link_com change one link)"
+                .to_owned(),
+            got: "one with branches".to_owned(),
+        }
+    }
+}

@@ -272,6 +272,9 @@ pub struct EffectInfo {
     pub beside: &'static [&'static str],
     /// Whether no two runs repeat it. Such an effect is noise, which no simulator removes.
     pub unrepeatable: bool,
+    /// Whether it acts at the one tip of a chain, or on the one joint after a link. A robot with
+    /// branches has several, and refuses it.
+    pub needs_chain: bool,
     /// Parameter of the robot that it changes.
     pub stands_for: Option<StandsFor>,
     /// How a linear model includes it.
@@ -320,6 +323,7 @@ impl EffectInfo {
         scales: None,
         beside: &[],
         unrepeatable: false,
+        needs_chain: false,
         stands_for: None,
         linear: Linear::No,
         inverse_dynamics: true,

@@ -4,6 +4,7 @@ use super::axis::{Lead, axes};
 use super::equations::Plant;
 use super::own::{OnPair, Own};
 use crate::effect::{Acts, BaseJoint, EffectError, EffectInfo, Kernel, PlantParameters, Scope};
+use crate::robot::description::moves_with;
 use crate::robot::{Chain, ChainJoint, Dynamics, MOST_JOINTS, Parameter, Place, RobotDescription};
 use axisight_scalar::Scalar;
 use std::sync::Arc;
@@ -117,6 +118,9 @@ impl<S: Scalar> Plant<S> {
     ) -> Result<(), PlantError> {
         check_states(info, kernel.n_internal())?;
         check_base(info, kernel.base_joints().len())?;
+        if info.needs_chain && !self.chain.is_chain() {
+            return Err(EffectError::on_tree(info.name).into());
+        }
         let first = self.n_internal;
         let own = Own {
             kernel,
@@ -180,10 +184,17 @@ impl<S: Scalar> Plant<S> {
         for accelerometer in &mut self.accelerometers {
             accelerometer.joint += count;
         }
+        // The springs carry everything that stood on the ground.
+        let last = (self.n_base + count).checked_sub(1);
+        for joint in self.chain.joints.iter_mut().skip(self.n_base) {
+            let inner = joint.parent.filter(|parent| *parent >= self.n_base);
+            joint.parent = inner.map_or(last, |parent| Some(parent + count));
+        }
         for (i, joint) in joints.into_iter().enumerate() {
             let place = self.n_base + i;
             self.elastic.push((place, joint.stiffness, joint.damping));
             let link = ChainJoint {
+                parent: place.checked_sub(1),
                 motion: joint.motion,
                 origin: None,
                 shift: None,
@@ -247,13 +258,14 @@ impl<S: Scalar> Plant<S> {
 }
 
 impl<S: Scalar> Plant<S> {
-    /// Joint that carries the link which moves with an axis but not with the next axis.
+    /// Joint that carries the link which moves with an axis but not with a further axis.
     fn link(&self, index: usize) -> Option<usize> {
-        let end = self
-            .axes
-            .get(index + 1)
-            .map_or(self.chain.len(), |next| next.joint);
-        (self.axes[index].joint..end).find(|i| self.chain.joints[*i].body.is_some())
+        let joints = &self.chain.joints;
+        let driven = self.axes[index].joint;
+        let parent = |i: usize| joints[i].parent;
+        let is_driven = |i: usize| self.axes.iter().any(|axis| axis.joint == i);
+        (driven..joints.len())
+            .find(|i| joints[*i].body.is_some() && moves_with(*i, driven, parent, is_driven))
     }
 }
 

@@ -1,4 +1,4 @@
-//! A serial chain with differentiable mass properties, and its poses.
+//! A chain or tree of joints with differentiable mass properties, and its poses.
 
 use super::description::{Joint, Link, Motion, RobotDescription};
 use super::vector::{Mat3, Vec3, rotation};
@@ -28,6 +28,8 @@ impl<S: Scalar> From<&Link> for Body<S> {
 /// One joint with the link that it moves.
 #[derive(Debug, Clone)]
 pub struct ChainJoint<S> {
+    /// Index of the joint whose link carries this joint, below its own index; `None` is the base.
+    pub parent: Option<usize>,
     /// Kind of motion of the joint.
     pub motion: Motion,
     /// Position in the parent link's frame [m]; `None` is its origin.
@@ -45,6 +47,7 @@ pub struct ChainJoint<S> {
 impl<S: Scalar> From<&Joint> for ChainJoint<S> {
     fn from(joint: &Joint) -> Self {
         Self {
+            parent: joint.parent,
             motion: joint.motion,
             origin: joint
                 .origin
@@ -59,12 +62,12 @@ impl<S: Scalar> From<&Joint> for ChainJoint<S> {
     }
 }
 
-/// A serial chain with differentiable mass properties.
+/// A chain, or a tree, of joints with differentiable mass properties.
 #[derive(Debug, Clone)]
 pub struct Chain<S> {
     /// Gravity in the base frame [m/s^2].
     pub gravity: [S; 3],
-    /// Joints from base to tip.
+    /// Joints, every one behind its parent.
     pub joints: Vec<ChainJoint<S>>,
 }
 
@@ -96,6 +99,7 @@ impl<S: Scalar> Chain<S> {
             inertia: b.inertia.map(D::from_real),
         };
         let joint = |j: &ChainJoint<S>| ChainJoint {
+            parent: j.parent,
             motion: j.motion,
             origin: j.origin,
             shift: j.shift.map(|d| d.map(D::from_real)),
@@ -143,6 +147,17 @@ impl<S: Scalar> Chain<S> {
         self.joints.is_empty()
     }
 
+    /// Whether each joint sits on the link of the joint before it, and the first one on the base.
+    pub fn is_chain(&self) -> bool {
+        let mut joints = self.joints.iter().enumerate();
+        joints.all(|(i, joint)| joint.parent == i.checked_sub(1))
+    }
+
+    /// The joints that move link `joint`, from it to the base.
+    pub fn path(&self, joint: usize) -> impl Iterator<Item = usize> {
+        std::iter::successors(Some(joint), |i| self.joints[*i].parent)
+    }
+
     /// Whether any number of the chain carries derivatives.
     pub fn carries_derivatives(&self) -> bool {
         let depends = |x: &S| {
@@ -163,13 +178,14 @@ impl<S: Scalar> Chain<S> {
 
     /// Pose of every link frame at joint angles `q`.
     pub fn poses(&self, q: &[S]) -> Vec<Pose<S>> {
-        let mut pose = Pose {
+        let base = Pose {
             rotation: Mat3::identity(),
             position: Vec3::zero(),
             axis: Vec3::zero(),
         };
-        let mut out = Vec::with_capacity(self.len());
+        let mut out: Vec<Pose<S>> = Vec::with_capacity(self.len());
         for (joint, q) in self.joints.iter().zip(q) {
+            let mut pose = joint.parent.map_or(base, |parent| out[parent]);
             pose.axis = pose.rotation.apply_constant(&joint.axis);
             if let Some(origin) = &joint.origin {
                 pose.position += pose.rotation.apply_constant(origin);

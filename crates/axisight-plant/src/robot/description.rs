@@ -1,4 +1,4 @@
-//! Description of a robot: a serial chain of joints, links and drives, in SI units.
+//! Description of a robot: a tree of joints, links and drives, in SI units. Most are serial chains.
 //!
 //! The checks here are physical and independent of files. The reader of robot files runs them and
 //! reports the place of an error in the file.
@@ -49,11 +49,14 @@ pub struct Drive {
     pub viscous_friction: f64,
 }
 
-/// One joint of the chain and the link it moves.
+/// One joint and the link it moves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
     /// Name, unique in the robot.
     pub name: String,
+    /// Index of the joint whose link carries this joint, below the joint's own index; `None` is the
+    /// base.
+    pub parent: Option<usize>,
     /// How the joint moves.
     pub motion: Motion,
     /// Position of the joint in the parent link's frame [m].
@@ -192,7 +195,7 @@ impl Controller {
     }
 }
 
-/// A serial robot, from base to tip.
+/// A robot on a fixed base, from the base to the tips.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotDescription {
     /// Name for people.
@@ -201,7 +204,7 @@ pub struct RobotDescription {
     pub gravity: [f64; 3],
     /// Sample time of controller and log, positive [s].
     pub sample_time: f64,
-    /// Joints in chain order; link `i` moves with joint `i`.
+    /// Joints, every one behind its parent; link `i` moves with joint `i`.
     pub joints: Vec<Joint>,
     /// Controller.
     pub controller: Controller,
@@ -267,12 +270,31 @@ impl RobotDescription {
     /// The last joint that moves no inertia, if any. Such a joint makes the inertia matrix singular
     /// in every pose.
     pub fn joint_without_inertia(&self) -> Option<usize> {
-        let last_mass = self.joints.iter().rposition(|joint| joint.link.is_some());
-        let singular = self
-            .joints
-            .iter()
-            .rposition(|joint| !joint.carries_inertia());
-        singular.filter(|joint| last_mass.is_none_or(|mass| *joint > mass))
+        let mut moves_mass = vec![false; self.joints.len()];
+        for (i, joint) in self.joints.iter().enumerate().rev() {
+            moves_mass[i] |= joint.link.is_some();
+            if let Some(parent) = joint.parent {
+                moves_mass[parent] |= moves_mass[i];
+            }
+        }
+        let mut joints = self.joints.iter().zip(&moves_mass);
+        joints.rposition(|(joint, moves_mass)| !moves_mass && !joint.carries_inertia())
+    }
+
+    /// Whether each joint sits on the link of the joint before it, and the first one on the base.
+    pub fn is_chain(&self) -> bool {
+        let mut joints = self.joints.iter().enumerate();
+        joints.all(|(i, joint)| joint.parent == i.checked_sub(1))
+    }
+
+    /// The joint that carries the link of a driven axis: the first joint with mass, from the driven
+    /// one on, that moves with it but with no further axis.
+    pub fn link_of_axis(&self, index: usize) -> Option<usize> {
+        let (driven, ..) = self.driven().nth(index)?;
+        let parent = |i: usize| self.joints[i].parent;
+        let is_driven = |i: usize| self.joints[i].drive.is_some();
+        (driven..self.joints.len())
+            .find(|i| self.joints[*i].link.is_some() && moves_with(*i, driven, parent, is_driven))
     }
 
     /// The first pair of joints (earlier, later) that share a name.
@@ -285,6 +307,23 @@ impl RobotDescription {
             earlier.map(|earlier| (earlier, later))
         })
     }
+}
+
+/// Whether link `i` moves with the driven joint `axis`, and no joint between both is driven.
+pub(crate) fn moves_with(
+    i: usize,
+    axis: usize,
+    parent: impl Fn(usize) -> Option<usize>,
+    is_driven: impl Fn(usize) -> bool,
+) -> bool {
+    let mut at = i;
+    while at != axis {
+        match parent(at) {
+            Some(before) if !is_driven(at) => at = before,
+            _ => return false,
+        }
+    }
+    true
 }
 
 impl Joint {

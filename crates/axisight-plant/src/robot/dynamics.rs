@@ -1,4 +1,4 @@
-//! Equations of motion of the chain, as the integrators call them.
+//! Equations of motion of a chain or a tree of joints, as the integrators call them.
 //!
 //! The terms that depend on the joint angles alone come first: joint axes, masses and the inertia
 //! matrix (composite rigid bodies). The rates then give the bias forces (recursive Newton-Euler),
@@ -12,12 +12,14 @@
 //!
 //! The code is compiled for a few numbers of joints, so that its loops are unrolled. A chain just
 //! below one of these numbers is padded with joints that move nothing. Longer chains share the code
-//! for any number of joints. So do numbers with derivatives, because their arithmetic takes much
-//! longer than the loops.
+//! for any number of joints. So do trees, and numbers with derivatives, because their arithmetic
+//! takes much longer than the loops. Only this code looks for branches.
 
+mod branches;
 mod frame;
 mod specific_force;
 
+use self::branches::{Branch, Fork, LinkMotion, Start, branches};
 use self::frame::Frame;
 use super::along::Along;
 use super::chain::{Body, Chain, ChainJoint};
@@ -108,6 +110,7 @@ impl<S: Scalar> Moments<S> {
 /// One joint with the link that it moves, prepared for the sweeps.
 #[derive(Debug, Clone)]
 struct Segment<S> {
+    branch: Branch,
     turn: Turn,
     origin: Option<[f64; 3]>,
     shift: Option<[S; 3]>,
@@ -115,9 +118,10 @@ struct Segment<S> {
     body: Option<Moments<S>>,
 }
 
-impl<S: Scalar> From<&ChainJoint<S>> for Segment<S> {
-    fn from(joint: &ChainJoint<S>) -> Self {
+impl<S: Scalar> Segment<S> {
+    fn new(joint: &ChainJoint<S>, branch: Branch) -> Self {
         Self {
+            branch,
             turn: Turn::new(joint.motion, joint.axis),
             origin: joint.origin,
             shift: joint.shift,
@@ -127,11 +131,15 @@ impl<S: Scalar> From<&ChainJoint<S>> for Segment<S> {
     }
 }
 
-/// Equations of motion of a chain with fixed mass properties.
+/// Equations of motion of a chain or tree with fixed mass properties.
 #[derive(Debug, Clone)]
 pub struct Dynamics<S> {
     gravity: [S; 3],
     segments: Vec<Segment<S>>,
+    /// Whether some joint does not sit on the link before it.
+    is_tree: bool,
+    /// Number of links that carry such joints.
+    n_forks: usize,
 }
 
 /// A motion (turn, shift) or a wrench (moment, force) about the base origin.
@@ -202,6 +210,7 @@ pub struct DynamicsScratch<S: Scalar> {
     /// Moments of the links about the base origin, in base axes.
     moments: Vec<Moments<S>>,
     wrenches: Vec<Screw<S>>,
+    forks: Vec<Fork<S>>,
 }
 
 /// View of the scratch memory with a compiled size.
@@ -215,6 +224,8 @@ struct Sized<'a, S, const N: usize> {
     axes: &'a mut [Screw<S>; N],
     moments: &'a mut [Moments<S>; N],
     wrenches: &'a mut [Screw<S>; N],
+    /// Empty for chains.
+    forks: &'a mut [Fork<S>],
 }
 
 impl<S: Scalar> DynamicsScratch<S> {
@@ -244,6 +255,11 @@ impl<S: Scalar> DynamicsScratch<S> {
             axes: self.axes.first_chunk_mut()?,
             wrenches: self.wrenches.first_chunk_mut()?,
             moments: self.moments.first_chunk_mut()?,
+            forks: if branched::<N>() {
+                &mut self.forks
+            } else {
+                &mut []
+            },
         })
     }
 
@@ -265,6 +281,11 @@ const fn rows<const N: usize>(len: usize) -> usize {
     if N == MOST_JOINTS { len } else { N }
 }
 
+/// Whether the code for `N` joints serves trees.
+const fn branched<const N: usize>() -> bool {
+    N == MOST_JOINTS
+}
+
 /// Inertia matrix and bias forces, for callers outside of the integrators.
 #[derive(Debug, Clone)]
 pub struct DynamicsState<S> {
@@ -274,16 +295,16 @@ pub struct DynamicsState<S> {
     pub bias: Vec<S>,
 }
 
-/// Longest chain that can be simulated. Code of this size serves any number of joints.
+/// Largest number of joints. Code of this size serves any number of joints, and trees.
 pub const MOST_JOINTS: usize = 32;
 
-/// Call `$method::<N>($arguments)` for the smallest compiled size that holds `$n` joints.
+/// Call `$method::<N>($arguments)` for the smallest compiled size that holds the joints.
 macro_rules! sized {
-    ($n:expr, $object:ident . $method:ident ( $($argument:expr),* )) => {
-        if const { S::PARTIALS > 0 } {
+    ($object:ident . $method:ident ( $($argument:expr),* )) => {
+        if const { S::PARTIALS > 0 } || $object.is_tree {
             $object.$method::<MOST_JOINTS>($($argument),*)
         } else {
-            match $n {
+            match $object.len() {
                 0..=1 => $object.$method::<1>($($argument),*),
                 2..=3 => $object.$method::<3>($($argument),*),
                 4..=7 => $object.$method::<7>($($argument),*),
@@ -296,9 +317,18 @@ macro_rules! sized {
 impl<S: Scalar> Dynamics<S> {
     /// Equations of motion of `chain`.
     pub fn new(chain: &Chain<S>) -> Self {
+        let branches = branches(&chain.joints);
+        let forks = branches.iter().filter(|branch| branch.fork.is_some());
+        let n_forks = forks.count();
+        let is_tree = branches.iter().any(|branch| branch.start.is_some());
+        let joints = chain.joints.iter().zip(branches);
         Self {
             gravity: chain.gravity,
-            segments: chain.joints.iter().map(Segment::from).collect(),
+            segments: joints
+                .map(|(joint, branch)| Segment::new(joint, branch))
+                .collect(),
+            is_tree,
+            n_forks,
         }
     }
 
@@ -370,7 +400,7 @@ impl<S: Scalar> Dynamics<S> {
 
     /// Scratch memory for an evaluation.
     pub fn scratch(&self) -> DynamicsScratch<S> {
-        let n = sized!(self.len(), self.padded_size());
+        let n = sized!(self.padded_size());
         DynamicsScratch {
             along: None,
             inertia: vec![S::zero(); n * n],
@@ -380,6 +410,7 @@ impl<S: Scalar> Dynamics<S> {
             axes: vec![Screw::zero(); n],
             moments: vec![Moments::zero(); n],
             wrenches: vec![Screw::zero(); n],
+            forks: vec![Fork::new(); self.n_forks],
         }
     }
 
@@ -394,7 +425,7 @@ impl<S: Scalar> Dynamics<S> {
         if let Some(along) = &mut scratch.along {
             return along.place(q);
         }
-        sized!(self.len(), self.place_sized(q, scratch));
+        sized!(self.place_sized(q, scratch));
     }
 
     /// Compute the bias forces at rates `v` and the angles set last.
@@ -402,7 +433,7 @@ impl<S: Scalar> Dynamics<S> {
         if let Some(along) = &mut scratch.along {
             return along.bias(v, &mut scratch.bias);
         }
-        sized!(self.len(), self.add_rates_sized(v, scratch));
+        sized!(self.add_rates_sized(v, scratch));
     }
 
     /// Factorize the inertia matrix in place.
@@ -410,7 +441,7 @@ impl<S: Scalar> Dynamics<S> {
         if scratch.along.is_some() {
             return;
         }
-        sized!(self.len(), self.factorize_sized(scratch));
+        sized!(self.factorize_sized(scratch));
     }
 
     /// Replace forces by accelerations, with the factorized inertia matrix.
@@ -418,7 +449,7 @@ impl<S: Scalar> Dynamics<S> {
         if let Some(along) = &mut scratch.along {
             return along.accelerate(&mut scratch.bias);
         }
-        sized!(self.len(), self.solve_sized(scratch));
+        sized!(self.solve_sized(scratch));
     }
 
     #[inline(never)]
@@ -451,13 +482,23 @@ impl<S: Scalar> Dynamics<S> {
         let Some(sized) = scratch.sized::<N>(self.len()) else {
             return;
         };
-        let mut velocity = Screw::zero();
-        // Gravity enters as an acceleration of the base.
-        let mut acceleration = Screw {
-            angular: Vec3::zero(),
-            linear: Vec3(self.gravity.map(|g| -g)),
-        };
+        let base = LinkMotion::base(&self.gravity);
+        let LinkMotion {
+            mut velocity,
+            mut acceleration,
+        } = base;
         for (i, (segment, v)) in self.segments.iter().zip(v).enumerate().take(N) {
+            if branched::<N>()
+                && let Some(start) = segment.branch.start
+            {
+                LinkMotion {
+                    velocity,
+                    acceleration,
+                } = match start {
+                    Start::Base => base,
+                    Start::Fork(fork) => sized.forks[fork].motion,
+                };
+            }
             let motion = sized.axes[i].scale(*v);
             velocity.turn_add(&motion, &mut acceleration);
             velocity.add(&motion);
@@ -467,13 +508,35 @@ impl<S: Scalar> Dynamics<S> {
                 velocity.turn_momentum_add(&moments.wrench(&velocity), &mut wrench);
                 sized.wrenches[i] = wrench;
             }
+            if branched::<N>()
+                && let Some(fork) = segment.branch.fork
+            {
+                sized.forks[fork].motion = LinkMotion {
+                    velocity,
+                    acceleration,
+                };
+                sized.forks[fork].wrench = Screw::zero();
+            }
         }
         let mut tip = Screw::zero();
         for (i, segment) in self.segments.iter().enumerate().take(N).rev() {
+            if branched::<N>()
+                && let Some(fork) = segment.branch.fork
+            {
+                tip.add(&sized.forks[fork].wrench);
+            }
             if segment.body.is_some() {
                 tip.add(&sized.wrenches[i]);
             }
             sized.bias[i] = sized.axes[i].dot(&tip);
+            if branched::<N>()
+                && let Some(start) = segment.branch.start
+            {
+                if let Start::Fork(fork) = start {
+                    sized.forks[fork].wrench.add(&tip);
+                }
+                tip = Screw::zero();
+            }
         }
     }
 
@@ -483,6 +546,14 @@ impl<S: Scalar> Dynamics<S> {
         S::sin_cos_each(&sized.angles[..n], &mut sized.trigonometry[..n]);
         let mut frame = Frame::base();
         for (i, segment) in self.segments.iter().enumerate().take(N) {
+            if branched::<N>()
+                && let Some(start) = segment.branch.start
+            {
+                frame = match start {
+                    Start::Base => Frame::base(),
+                    Start::Fork(fork) => sized.forks[fork].frame,
+                };
+            }
             if let Some(origin) = &segment.origin {
                 frame.position += frame.apply_constant(origin);
             }
@@ -500,6 +571,12 @@ impl<S: Scalar> Dynamics<S> {
             if let Some(body) = &segment.body {
                 sized.moments[i] = frame.moments(body);
             }
+            if branched::<N>()
+                && let Some(fork) = segment.branch.fork
+            {
+                sized.forks[fork].frame = frame;
+                sized.forks[fork].moments = Moments::zero();
+            }
         }
     }
 
@@ -508,14 +585,32 @@ impl<S: Scalar> Dynamics<S> {
         let mut tip = Moments::zero();
         // The wrench on all outer links for a unit acceleration of each joint.
         for (i, segment) in self.segments.iter().enumerate().take(N).rev() {
+            if branched::<N>()
+                && let Some(fork) = segment.branch.fork
+            {
+                tip.add(&sized.forks[fork].moments);
+            }
             if segment.body.is_some() {
                 tip.add(&sized.moments[i]);
             }
             sized.wrenches[i] = tip.wrench(&sized.axes[i]);
+            if branched::<N>()
+                && let Some(start) = segment.branch.start
+            {
+                if let Start::Fork(fork) = start {
+                    sized.forks[fork].moments.add(&tip);
+                }
+                tip = Moments::zero();
+            }
         }
         for i in 0..sized.n {
             for j in i..sized.n {
-                sized.inertia[i][j] = sized.axes[i].dot(&sized.wrenches[j]);
+                let carried = !branched::<N>() || self.segments[j].branch.is_moved_by(i);
+                sized.inertia[i][j] = if carried {
+                    sized.axes[i].dot(&sized.wrenches[j])
+                } else {
+                    S::zero()
+                };
             }
         }
         for i in self.len()..sized.n {

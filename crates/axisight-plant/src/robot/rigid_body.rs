@@ -5,7 +5,7 @@ use super::description::{Motion, RobotDescription};
 use super::dynamics::{Dynamics, DynamicsScratch, DynamicsState};
 use nalgebra::DMatrix;
 
-/// Kinematics and dynamics of the chain of all joints (driven and elastic).
+/// Kinematics and dynamics of all joints (driven and elastic).
 #[derive(Debug, Clone)]
 pub struct RigidBody {
     chain: Chain<f64>,
@@ -27,7 +27,7 @@ pub struct ShapeError {
 }
 
 impl RigidBody {
-    /// The chain of a robot, without motors and springs.
+    /// The joints of a robot, without motors and springs.
     pub fn new(robot: &RobotDescription) -> Self {
         let chain = Chain::new(robot);
         Self {
@@ -189,7 +189,7 @@ impl RigidBody {
 
     /// Geometric Jacobian of a point fixed in the frame of `joint`: rows are
     /// linear velocity [m] then angular velocity of that link, base frame;
-    /// columns are all joints.
+    /// columns are all joints. Joints that do not carry the link have zeros.
     ///
     /// # Errors
     /// [`ShapeError`], also for a joint the chain does not have.
@@ -203,7 +203,7 @@ impl RigidBody {
         self.check_joint(joint)?;
         let tip = poses[joint].position + poses[joint].rotation.apply_constant(&point);
         let mut out = DMatrix::zeros(6, self.n_joints());
-        for i in 0..=joint {
+        for i in self.chain.path(joint) {
             let axis = poses[i].axis;
             match self.motion[i] {
                 Motion::Revolute => {

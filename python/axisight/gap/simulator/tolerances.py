@@ -14,6 +14,7 @@ from axisight.effects import Effect, effect_info
 from axisight.fitting import robot_parameters
 from axisight.gap.facts.settings import Settings
 from axisight.robot import Robot, load_robot
+from axisight.robot.branches import refuse_branches
 from axisight.robot_file import load_identified
 from axisight.robot_file.sidecar import sidecar_path
 
@@ -55,11 +56,13 @@ def loaded(
 ) -> tuple[Robot, Settings]:
     """Return the simulator, and settings with the tolerances in and beside its file.
 
-    ``sample_time_s``: for a model file that states none.
+    ``sample_time_s``: for a model file that states none. Raises RobotError for a robot with branches.
     """
     if isinstance(source, Robot):
+        refuse_branches(source, "the diagnosis")
         return source, settings
     machine = load_robot(source, sample_time_s=sample_time_s)
+    refuse_branches(machine, "the diagnosis")
     if settings.tolerances is not None:
         return machine, settings
     return machine, with_tolerances(settings, machine, source)

@@ -166,7 +166,8 @@ class _Compiled:
         if ("joint", name) not in self.lines:
             where = self.free.get(body, where)
         motion = self.motions.get(int(model.jnt_type[j]), "other")
-        refused = mimics(self._name("joint", self.masters[j])) if j in self.masters else ""
+        follows = self._name("joint", self.masters[j]) if j in self.masters else ""
+        refused = mimics(follows) if follows else ""
         if motion == "other":
             refused = (
                 "expected hinge and slide joints between base and tip, got a ball or free joint: choose "
@@ -216,6 +217,7 @@ class _Compiled:
             refused,
             bare=bare,
             of=body,
+            follows=follows,
         )
 
     def _friction_law(self, dof: int) -> tuple[float, float]:

@@ -6,6 +6,7 @@ use axisight_scalar::Scalar;
 use std::array::from_fn;
 
 /// Pose of a link.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Frame<S> {
     columns: [Vec3<S>; 3],
     pub(super) position: Vec3<S>,

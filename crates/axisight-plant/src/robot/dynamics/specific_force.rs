@@ -6,7 +6,7 @@
 //! velocity `u = v + w x p` and the acceleration `a + w' x p + w x u`.
 
 use super::super::accelerometer::{Accelerometer, JointMotion};
-use super::{Dynamics, Frame, Screw, Turn};
+use super::{Dynamics, Frame, LinkMotion, Screw, Start, Turn};
 use crate::robot::vector::Vec3;
 use axisight_scalar::Scalar;
 
@@ -20,20 +20,42 @@ impl<S: Scalar> Dynamics<S> {
         accelerometers: &[Accelerometer],
         out: &mut [S],
     ) {
-        let mut frame = Frame::base();
-        let mut velocity = Screw::zero();
-        let mut acceleration = Screw {
-            angular: Vec3::zero(),
-            linear: Vec3(self.gravity.map(|g| -g)),
-        };
+        let base = (Frame::base(), LinkMotion::base(&self.gravity));
+        let mut forks = vec![base; self.n_forks];
+        let (
+            mut frame,
+            LinkMotion {
+                mut velocity,
+                mut acceleration,
+            },
+        ) = base;
         let last = accelerometers.iter().map(|a| a.joint).max().unwrap_or(0);
         let rates = motion.v.iter().zip(motion.a);
         let joints = self.segments.iter().zip(motion.q).zip(rates);
         for (joint, ((segment, q), (v, a))) in joints.enumerate().take(last + 1) {
+            if let Some(start) = segment.branch.start {
+                (
+                    frame,
+                    LinkMotion {
+                        velocity,
+                        acceleration,
+                    },
+                ) = match start {
+                    Start::Base => base,
+                    Start::Fork(fork) => forks[fork],
+                };
+            }
             let axis = segment.advance(*q, &mut frame);
             velocity.turn_add(&axis.scale(*v), &mut acceleration);
             acceleration.add(&axis.scale(*a));
             velocity.add(&axis.scale(*v));
+            if let Some(fork) = segment.branch.fork {
+                let motion = LinkMotion {
+                    velocity,
+                    acceleration,
+                };
+                forks[fork] = (frame, motion);
+            }
             let mut slot = 0;
             for one in accelerometers {
                 let end = slot + one.directions.len();

@@ -285,6 +285,7 @@ mod tests {
     fn robot() -> RobotDescription {
         let joint = |name: &str, stiffness, drive, mass| Joint {
             name: name.to_owned(),
+            parent: drive.is_none().then_some(0),
             motion: Motion::Revolute,
             origin: [0.0, 0.0, 0.5],
             axis: [0.0, 1.0, 0.0],
