@@ -53,7 +53,9 @@ def with_modelled_remainder(
     fitted, base = _best_of(seen, after, tuple(cause.as_effect() for cause in out.causes))
     if fitted.terms:
         fitted = with_nearest_laws(fitted, seen, refitted(seen.fitter, _quiet))
-    modelled = judged(fitted, seen, held, after, base)
+    # By another comparison than that of the verdict, the figure before is that of the causes that were named:
+    # effects that did not carry over in closed loop may say anything by inverse dynamics.
+    modelled = judged(fitted, seen, held, after if seen is view else base, base)
     return replace(
         out,
         headline=f"{out.headline} {_told(modelled, by_inverse=seen is not view)}",
