@@ -38,3 +38,6 @@ STEP_LEFT = 0.1
 
 It takes 0.1 % from the coverage of a 95 % interval.
 """
+
+SMALLEST_STEP = 1e-8
+"""Step at which the fit of a posterior ends, relative to the scale of a parameter [1]; the loss ends it earlier."""

@@ -12,10 +12,7 @@ from axisight.gap.fit.model_fitter import ModelFitter
 from axisight.gap.fit.work_count import WorkCount
 from axisight.gap.search.balanced_values import inflation
 from axisight.gap.uncertainty.covariance import inverse, sandwich
-from axisight.posterior.settings import STEP_LEFT
-
-# Step, relative to the scale of each parameter, below which rounding decides. The fall of the loss ends a fit earlier.
-_SMALLEST_STEP = 1e-8
+from axisight.posterior.settings import SMALLEST_STEP, STEP_LEFT
 
 
 def own_fitter(fitter: ModelFitter, model: FittedModel) -> ModelFitter:
@@ -47,7 +44,7 @@ def evaluated(fitter: ModelFitter, model: FittedModel) -> FittedModel:
     if not here.parameters:
         return here
     precise = copy(fitter)
-    precise.step_tolerance = _SMALLEST_STEP
+    precise.step_tolerance = SMALLEST_STEP
     there = precise.fit(here.free, here, fresh=True, worth=least_fall(here))
     if isinstance(there, Diverged) or not (there.converged or there.stuck):
         return here
