@@ -42,6 +42,9 @@ STILL_RAD_S = 0.001
 MARGIN = (20, 8)
 """Samples after and before a rest whose torque is not used: static friction still holds."""
 
+DIVERGED = 100.0
+"""An NRMSE above this says nothing but that a simulation diverged."""
+
 Array = NDArray[np.float64]
 
 
@@ -241,6 +244,8 @@ def nrmse(position: Array, record: Recording) -> Array:
 def row(name: str, causal: str, position: Array, record: Recording) -> str:
     """Return a line of the table."""
     e = nrmse(position, record)
+    if e.max() > DIVERGED:
+        return f"| {name} | {causal} | diverges | | |"
     y = record.position_rad[: len(position)]
     by_range = np.mean(e * y.std(axis=0) / np.ptp(y, axis=0))
     axes = ", ".join(f"{x:.2f}" for x in e)
