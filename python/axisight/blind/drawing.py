@@ -85,7 +85,9 @@ class Choice:
 
 def _effects_of(engine: str | None) -> list[str]:
     """Return the names of the effects of an engine, or of those that all engines have."""
-    kinds = [_all_kinds(e) for e in ([engine] if engine in ENGINES else ENGINES)]
+    kinds = [
+        _all_kinds(e) for e in ([engine] if engine is not None and engine in ENGINES else ENGINES)
+    ]
     return [name for name in kinds[0] if all(name in others for others in kinds)]
 
 

@@ -145,7 +145,8 @@ def simulate_command(
         for k, (path, inputs) in enumerate(zip(targets.values(), drives, strict=True)):
             result = simulate(
                 machine,
-                **inputs,
+                torque_nm=inputs.get("torque_nm"),
+                velocity_ref_rad_s=inputs.get("velocity_ref_rad_s"),
                 start_rad=None if start is None else numbers("--start", start),
                 model=cast(Model, model),
                 method=cast(Method, method),

@@ -20,7 +20,15 @@ from prose import (
 
 LONGEST_PAGE = 2500
 # Tables of everything there is, written by scripts: readers look things up there.
-GENERATED = {"cli.md", "constants.md", "effects.md", "gallery.md", "mujoco_homes.md", "plots.md", "verdict.md"}
+GENERATED = {
+    "cli.md",
+    "constants.md",
+    "effects.md",
+    "gallery.md",
+    "mujoco_homes.md",
+    "plots.md",
+    "verdict.md",
+}
 # What a newcomer reads first.
 BEGINNERS = ("index", "start_diagnose", "start_identify", "start_simulate", "ten_minutes", "floor")
 # Flesch calls 60 to 70 plain English, 50 to 60 fairly difficult; field terms have many syllables.

@@ -52,7 +52,7 @@ def randomization_document(
         _entry(known, number, f, homeless) for number, f in zip(numbers, fields.every, strict=True)
     ]
     return RandomizationDocument(
-        format=SCHEMA,
+        schema=SCHEMA,
         name=known.name,
         verdict=known.verdict,
         robot=known.simulated.robot,
