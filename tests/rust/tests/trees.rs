@@ -153,7 +153,9 @@ fn the_order_of_branches_does_not_matter() {
     check(
         "accelerations",
         tree.forward_dynamics(&q, &v, &tau).expect("accelerations"),
-        turned.forward_dynamics(&x, &y, &own(&tau)).expect("accelerations"),
+        turned
+            .forward_dynamics(&x, &y, &own(&tau))
+            .expect("accelerations"),
     );
     let back = tree.forward_dynamics(&q, &v, &tree.inverse_dynamics(&q, &v, &a).expect("forces"));
     assert!(relative(&back.expect("accelerations"), &a) < 1e-10);
@@ -177,7 +179,10 @@ fn jacobians_are_the_slopes_of_poses_and_zero_for_other_branches() {
             let (low, high) = (origin(-1e-5), origin(1e-5));
             for k in 0..3 {
                 let slope = (high[k] - low[k]) / 2e-5;
-                assert!((jacobian[(k, j)] - slope).abs() < 1e-8, "link {link}, joint {j}");
+                assert!(
+                    (jacobian[(k, j)] - slope).abs() < 1e-8,
+                    "link {link}, joint {j}"
+                );
             }
         }
     }
@@ -190,7 +195,11 @@ fn lanes_and_derivatives_see_the_branches() {
     let [q, v, _] = state(9, &mut random);
     let plain = Dynamics::new(&Chain::<f64>::new(&whole));
     let at = plain.evaluate(&q, &v);
-    let lanes = |x: &[f64]| x.iter().map(|x| Lanes::<4>::constant(*x)).collect::<Vec<_>>();
+    let lanes = |x: &[f64]| {
+        x.iter()
+            .map(|x| Lanes::<4>::constant(*x))
+            .collect::<Vec<_>>()
+    };
     let in_lanes = Dynamics::new(&Chain::<Lanes<4>>::new(&whole)).evaluate(&lanes(&q), &lanes(&v));
     let first: Vec<f64> = in_lanes.inertia.iter().map(|x| x.lane(3)).collect();
     // Lanes have their own sine and cosine, right to a few units in the last place.
@@ -214,7 +223,10 @@ fn lanes_and_derivatives_see_the_branches() {
     for i in 0..9 {
         let difference = (high[i] - low[i]) / 2e-6;
         // Forces of about 100 rounded at 1e-16, over 2e-6: about 1e-8 of them.
-        assert!((slope[i].partials[0] - difference).abs() < 1e-5, "joint {i}");
+        assert!(
+            (slope[i].partials[0] - difference).abs() < 1e-5,
+            "joint {i}"
+        );
     }
 }
 
@@ -224,15 +236,22 @@ fn regressors_times_parameters_are_forces_and_energies() {
     for parents in [&ARMS[..], &TREE[..]] {
         let whole = grown(parents, &mut random);
         let (n, body) = (parents.len(), RigidBody::new(&whole));
-        let identity: Vec<f64> = (0..n * n).map(|k| f64::from(u8::from(k / n == k % n))).collect();
+        let identity: Vec<f64> = (0..n * n)
+            .map(|k| f64::from(u8::from(k / n == k % n)))
+            .collect();
         let regressor = Regressor::new(&whole, &identity, Vec::new()).expect("regressor");
         let [q, v, a] = state(n, &mut random);
         let parameters = link_parameters(&whole);
         let times = |rows: &[f64]| {
             let rows = rows.chunks_exact(parameters.len());
-            rows.map(|row| row.iter().zip(&parameters).map(|(x, y)| x * y).sum()).collect::<Vec<f64>>()
+            rows.map(|row| row.iter().zip(&parameters).map(|(x, y)| x * y).sum())
+                .collect::<Vec<f64>>()
         };
-        let along = Along { q: &q, v: &v, a: &a };
+        let along = Along {
+            q: &q,
+            v: &v,
+            a: &a,
+        };
         let forces = times(&regressor.evaluate(&along).expect("regressor"));
         let wanted = body.inverse_dynamics(&q, &v, &a).expect("forces");
         // Sums of 90 products of order ten on both sides.
@@ -288,6 +307,9 @@ fn effects_at_the_one_tip_refuse_branches() {
         };
         let error = assemble::<f64>(&whole, &[], &[setting]).expect_err("branches");
         let text = error.to_string();
-        assert!(text.contains(name) && text.contains("without branches"), "{text}");
+        assert!(
+            text.contains(name) && text.contains("without branches"),
+            "{text}"
+        );
     }
 }

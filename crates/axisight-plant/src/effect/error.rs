@@ -74,7 +74,8 @@ impl EffectError {
     pub fn on_tree(effect: &'static str) -> Self {
         Self::Lacking {
             effect,
-            expected: "a robot without branches (link_mass and link_com change one link)".to_owned(),
+            expected: "a robot without branches (link_mass and link_com change one link)"
+                .to_owned(),
             got: "one with branches".to_owned(),
         }
     }

@@ -293,9 +293,8 @@ impl RobotDescription {
         let (driven, ..) = self.driven().nth(index)?;
         let parent = |i: usize| self.joints[i].parent;
         let is_driven = |i: usize| self.joints[i].drive.is_some();
-        (driven..self.joints.len()).find(|i| {
-            self.joints[*i].link.is_some() && moves_with(*i, driven, parent, is_driven)
-        })
+        (driven..self.joints.len())
+            .find(|i| self.joints[*i].link.is_some() && moves_with(*i, driven, parent, is_driven))
     }
 
     /// The first pair of joints (earlier, later) that share a name.
