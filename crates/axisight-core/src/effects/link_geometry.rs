@@ -1,7 +1,10 @@
 //! Length of a link that differs from the simulator's, which displaces everything that the link
 //! carries.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, PlantParameters, Scales, shift};
+use super::{
+    Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, PlantParameters,
+    Scales, shift,
+};
 use axisight_scalar::Scalar;
 
 pub(super) static INFO: EffectInfo = EffectInfo {

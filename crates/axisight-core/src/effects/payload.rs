@@ -1,6 +1,9 @@
 //! A load on the last link that carries mass.
 
-use super::{Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, Mark, ParameterInfo, PlantParameters, Role, Scales, Scope};
+use super::{
+    Absorber, Acts, EffectInfo, Experiment, Family, Formula, Kernel, Linear, Mark, ParameterInfo,
+    PlantParameters, Role, Scales, Scope,
+};
 use crate::robot::Body;
 use axisight_scalar::Scalar;
 

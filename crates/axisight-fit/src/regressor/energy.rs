@@ -56,15 +56,24 @@ impl Regressor {
             gravity: Vec3::constant(self.geometry.gravity),
             fall: Lane::zero(),
         };
-        let mut reached = vec![base; n];
+        let Reached {
+            mut rate,
+            mut speed,
+            mut gravity,
+            mut fall,
+        } = base;
+        let tree = self.geometry.tree.as_ref();
+        let mut forks = vec![base; tree.map_or(0, |_| n)];
         let mut blocks = out.chunks_exact_mut(LINK_PARAMETERS);
         for (j, segment) in self.geometry.segments.iter().enumerate() {
-            let Reached {
-                mut rate,
-                mut speed,
-                mut gravity,
-                mut fall,
-            } = segment.parent.map_or(base, |parent| reached[parent]);
+            if tree.is_some() && !segment.follows(j) {
+                Reached {
+                    rate,
+                    speed,
+                    gravity,
+                    fall,
+                } = segment.parent.map_or(base, |parent| forks[parent]);
+            }
             let position = lanes(q, j);
             let (turn, offset) = (segment.turn(position), segment.offset(position));
             let (own_turn, own_shift) = segment.unit();
@@ -75,12 +84,14 @@ impl Regressor {
             let at = lanes(v, j);
             rate = own_turn.scale_add(at, &rate);
             speed = own_shift.scale_add(at, &speed);
-            reached[j] = Reached {
-                rate,
-                speed,
-                gravity,
-                fall,
-            };
+            if tree.is_some_and(|tree| tree.is_fork[j]) {
+                forks[j] = Reached {
+                    rate,
+                    speed,
+                    gravity,
+                    fall,
+                };
+            }
             if !self.links().contains(&j) {
                 continue;
             }

@@ -17,15 +17,16 @@
 
 mod branches;
 mod frame;
+mod spatial;
 mod specific_force;
 
 use self::branches::{Branch, Fork, LinkMotion, Start, branches};
 use self::frame::Frame;
+use self::spatial::{Moments, Screw};
 use super::along::Along;
-use super::chain::{Body, Chain, ChainJoint};
+use super::chain::{Chain, ChainJoint};
 use super::description::Motion;
 use super::linear_algebra::{factorize, solve_factorized};
-use super::vector::{Mat3, Vec3, shift_inertia};
 use axisight_scalar::Scalar;
 
 /// How a joint moves its link. Separate cases for coordinate axes save two thirds of the work.
@@ -47,63 +48,6 @@ impl Turn {
             (Motion::Revolute, [0.0, 0.0, z]) => Self::Z { reversed: z < 0.0 },
             (Motion::Revolute, _) => Self::About(axis),
         }
-    }
-}
-
-/// Mass, first and second moment of links about a point [kg, kg m, kg m^2].
-#[derive(Debug, Clone, Copy)]
-struct Moments<S> {
-    mass: S,
-    first: Vec3<S>,
-    second: [S; 6],
-}
-
-impl<S: Scalar> Moments<S> {
-    fn zero() -> Self {
-        Self {
-            mass: S::zero(),
-            first: Vec3::zero(),
-            second: [S::zero(); 6],
-        }
-    }
-
-    /// Moments of a link about its joint, in link axes.
-    fn of(body: &Body<S>) -> Self {
-        let com = Vec3(body.com);
-        let mut second = body.inertia;
-        shift_inertia(&mut second, &com, &Vec3::zero(), body.mass);
-        Self {
-            mass: body.mass,
-            first: com.scale(body.mass),
-            second,
-        }
-    }
-
-    #[inline(always)]
-    fn add(&mut self, other: &Self) {
-        self.mass += other.mass;
-        self.first += other.first;
-        for (a, b) in self.second.iter_mut().zip(&other.second) {
-            *a += *b;
-        }
-    }
-
-    /// Wrench that accelerates the links by a unit motion.
-    #[inline(always)]
-    fn wrench(&self, motion: &Screw<S>) -> Screw<S> {
-        let spun = Mat3::symmetric(&self.second).apply(&motion.angular);
-        let pushed = motion.linear.scale(self.mass);
-        Screw {
-            angular: self.first.cross_add(&motion.linear, &spun),
-            linear: motion.angular.cross_add(&self.first, &pushed),
-        }
-    }
-
-    /// Refer the moments to the point `-d`, relative to the present point.
-    #[inline(always)]
-    fn shift(&mut self, d: &Vec3<S>) {
-        shift_inertia(&mut self.second, d, &self.first, self.mass);
-        self.first = d.scale_add(self.mass, &self.first);
     }
 }
 
@@ -140,59 +84,6 @@ pub struct Dynamics<S> {
     is_tree: bool,
     /// Number of links that carry such joints.
     n_forks: usize,
-}
-
-/// A motion (turn, shift) or a wrench (moment, force) about the base origin.
-#[derive(Debug, Clone, Copy)]
-struct Screw<S> {
-    angular: Vec3<S>,
-    linear: Vec3<S>,
-}
-
-impl<S: Scalar> Screw<S> {
-    fn zero() -> Self {
-        Self {
-            angular: Vec3::zero(),
-            linear: Vec3::zero(),
-        }
-    }
-
-    #[inline(always)]
-    fn add(&mut self, other: &Self) {
-        self.angular += other.angular;
-        self.linear += other.linear;
-    }
-
-    #[inline(always)]
-    fn scale(&self, s: S) -> Self {
-        Self {
-            angular: self.angular.scale(s),
-            linear: self.linear.scale(s),
-        }
-    }
-
-    /// `sum +=` the rate of change of `motion`, which is fixed in a body that moves with `self`.
-    #[inline(always)]
-    fn turn_add(&self, motion: &Self, sum: &mut Self) {
-        sum.angular = self.angular.cross_add(&motion.angular, &sum.angular);
-        sum.linear = self.angular.cross_add(&motion.linear, &sum.linear);
-        sum.linear = self.linear.cross_add(&motion.angular, &sum.linear);
-    }
-
-    /// `sum +=` the rate of change of a momentum or wrench that is fixed in such a body.
-    #[inline(always)]
-    fn turn_momentum_add(&self, momentum: &Self, sum: &mut Self) {
-        sum.angular = self.angular.cross_add(&momentum.angular, &sum.angular);
-        sum.angular = self.linear.cross_add(&momentum.linear, &sum.angular);
-        sum.linear = self.angular.cross_add(&momentum.linear, &sum.linear);
-    }
-
-    /// Power of a wrench along a motion.
-    #[inline(always)]
-    fn dot(&self, other: &Self) -> S {
-        let angular = self.angular.dot(&other.angular);
-        self.linear.dot_add(&other.linear, angular)
-    }
 }
 
 /// Scratch memory and results of one evaluation, padded to a compiled size.
@@ -580,6 +471,16 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
+    /// Clear the inertia between joints of which none moves the other.
+    #[inline(never)]
+    fn clear_apart<const N: usize>(&self, sized: &mut Sized<'_, S, N>) {
+        for (j, segment) in self.segments.iter().enumerate() {
+            for i in (0..j).filter(|i| !segment.branch.is_moved_by(*i)) {
+                sized.inertia[i][j] = S::zero();
+            }
+        }
+    }
+
     #[inline(always)]
     fn compose<const N: usize>(&self, sized: &mut Sized<'_, S, N>) {
         let mut tip = Moments::zero();
@@ -605,13 +506,11 @@ impl<S: Scalar> Dynamics<S> {
         }
         for i in 0..sized.n {
             for j in i..sized.n {
-                let carried = !branched::<N>() || self.segments[j].branch.is_moved_by(i);
-                sized.inertia[i][j] = if carried {
-                    sized.axes[i].dot(&sized.wrenches[j])
-                } else {
-                    S::zero()
-                };
+                sized.inertia[i][j] = sized.axes[i].dot(&sized.wrenches[j]);
             }
+        }
+        if branched::<N>() && self.is_tree {
+            self.clear_apart(sized);
         }
         for i in self.len()..sized.n {
             sized.inertia[i][i] = S::one();
