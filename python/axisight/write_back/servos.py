@@ -122,7 +122,7 @@ def _gains(
     """Return the attributes of changed gains; the file's gains are those of MuJoCo, with defaults."""
     stated = servo.limits.drive.servo
     assert stated is not None  # gains of others were refused
-    by_cause, by_fit = _factors(causes), factors(refitted)
+    by_cause, by_fit = factors_of(causes), factors(refitted)
     kp, kv = (x * a * b for x, a, b in zip(stated, by_cause, by_fit, strict=True))
     if servo.element.tag == _GENERAL:
         return {"gainprm": kp, "biasprm": (0.0, -kp, -kv)}
@@ -134,8 +134,8 @@ def _gains(
     return made
 
 
-def _factors(causes: Sequence[Cause]) -> tuple[float, float]:
-    """Return the factors on the file's gains of position and speed."""
+def factors_of(causes: Sequence[Cause]) -> tuple[float, float]:
+    """Return the factors of causes on the file's gains of position and speed."""
     position = speed = 1.0
     for cause in causes:
         found = {name: value.value for name, value in cause.parameters.items()}

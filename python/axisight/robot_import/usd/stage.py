@@ -54,6 +54,9 @@ def check_layers(path: Path) -> None:
         layer = sdf.Layer.FindOrOpen(str(here)) if here.is_file() else None
         if layer is None:
             raise RobotError(f"{path}: expected a readable USD layer {shown(here.name)}")
+        # Another stage in this process may hold the layer as the file was before.
+        if not layer.dirty:
+            layer.Reload()
         if here.suffix.lower() == ".usdz":
             # A package holds its layers itself.
             continue
