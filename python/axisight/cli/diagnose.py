@@ -105,8 +105,8 @@ def diagnose_command(
     write_model: Annotated[
         Path | None,
         typer.Option(
-            help="Write the simulator with its causes here: robot file (.toml), or URDF or MJCF where "
-            "that was diagnosed."
+            help="Write the simulator with its causes here: robot file (.toml), or URDF, MJCF or USD "
+            "where that was diagnosed."
         ),
     ] = None,
     verbose: Annotated[
