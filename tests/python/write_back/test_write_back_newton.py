@@ -10,8 +10,9 @@ import pytest
 from axisight import load_robot
 from axisight.gap.facts.result import Cause, Interval
 from axisight.write_back import write_model
+from found_causes import several
 from newton_arm import NewtonArm
-from usd_data import body, joint, saved
+from usd_data import arm, body, joint, saved
 
 pytest.importorskip("newton", reason="needs pip install newton mujoco-warp: docs/usd.md")
 
@@ -68,3 +69,27 @@ def test_a_joint_slips_beyond_its_friction(tmp_path: Path):
     made = write_model(source, load_robot(source), [dry], tmp_path / "new.usda")
     # 0.2 s less the step before the first: 199 steps of acceleration.
     assert creep(made.path) == pytest.approx((PUSH_NM - 0.2) / INERTIA * 199 * STEP_S, rel=1e-3)
+
+
+def test_newton_reads_what_is_written(tmp_path: Path):
+    """Drive, armature, damping and mass of the layer as Newton's own reader has them."""
+    servo = "float drive:angular:physics:stiffness = 50\n float drive:angular:physics:damping = 2"
+    texts = dict.fromkeys(("turn", "shoulder", "elbow"), servo + "\n float newton:armature = 0.5")
+    source = saved(tmp_path, arm(texts, schemas='"PhysicsDriveAPI:angular"'))
+    causes = [
+        several("controller_gain", 1, relative_proportional=0.5, relative_integral=0.1),
+        several("torque_saturation", 2, limit_nm=40.0),
+        several("motor_inertia", 3, relative_change=0.4),
+        several("viscous_friction", 3, viscous_nm_s_rad=2.5),
+        several("link_mass", 2, relative_change=0.25),
+    ]
+    made = write_model(source, load_robot(source), causes, tmp_path / "new.usda")
+    assert made.left_out == ()
+    model = NewtonArm(made.path).model
+    per_radian = 180 / np.pi
+    assert model.joint_target_ke.numpy() == pytest.approx(np.array([75, 50, 50]) * per_radian)
+    assert model.joint_target_kd.numpy() == pytest.approx(np.array([2.2, 2, 2]) * per_radian)
+    assert model.joint_effort_limit.numpy()[1] == pytest.approx(40.0)
+    assert model.joint_armature.numpy() == pytest.approx([0.5, 0.5, 0.7])
+    assert model.joint_damping.numpy() == pytest.approx([0.0, 0.0, 2.5])
+    assert model.body_mass.numpy()[2] == pytest.approx(17.5)
