@@ -105,7 +105,7 @@ def diagnose_command(
     write_model: Annotated[
         Path | None,
         typer.Option(
-            help="Write the simulator with its causes here: robot file (.toml), or URDF or MJCF where "
+            help="Write the simulator with its causes here: robot file (.toml), or URDF, MJCF or USD where "
             "that was diagnosed. With --with-remainder, a robot file also has the modelled remainder."
         ),
     ] = None,

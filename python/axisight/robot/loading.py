@@ -14,7 +14,7 @@ from axisight.robot.sources import is_model_file, refuse_neither
 
 
 def load_robot(source: Path | str, *, sample_time_s: float | None = None) -> Robot:
-    """Return the robot of a ``source``: a TOML file, a model file (URDF, MJCF, DH table) or a preset.
+    """Return the robot of a ``source``: a TOML file, a model file (URDF, MJCF, USD, DH table) or a preset.
 
     Presets: ``irb6600_like`` (20 states) and ``two_mass_axis`` (thesis Table 9.1,
     model m3, with its cubic spring and Coulomb friction). `axisight.robot_import.import_robot` reads model

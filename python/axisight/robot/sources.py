@@ -10,7 +10,9 @@ from axisight.arguments import shown
 from axisight.documents import parse_toml, read_text
 from axisight.errors import RobotError
 
-MODEL_SUFFIXES = (".urdf", ".xml", ".mjcf", ".xacro", ".csv")
+USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+"""Suffixes of USD files."""
+MODEL_SUFFIXES = (".urdf", ".xml", ".mjcf", ".xacro", ".csv", *USD_SUFFIXES)
 """Suffixes of model files: robots in another format than that of robot files."""
 # Keys of a joint that occur only in tables of Denavit and Hartenberg.
 _GEOMETRY = ("theta_rad", "d_m", "a_m", "alpha_rad")

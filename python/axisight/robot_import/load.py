@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from axisight.errors import RobotError
 from axisight.robot.robot import Robot
+from axisight.robot.sources import USD_SUFFIXES
 from axisight.robot_import.bodies import Tree
 from axisight.robot_import.chain import Chain, chain_of
 from axisight.robot_import.description import description, torque_constants
@@ -19,6 +20,7 @@ from axisight.robot_import.drives import DriveData, read_drives
 from axisight.robot_import.mjcf import read_mjcf
 from axisight.robot_import.pinocchio_model import tree_of
 from axisight.robot_import.urdf import read_urdf
+from axisight.robot_import.usd import read_usd
 from axisight.robot_import.xml_tree import read_xml
 
 
@@ -55,23 +57,24 @@ def import_robot(
 
     Parameters
     ----------
-    source : URDF (``.urdf``, or ``.xml`` with <robot>), MJCF (``.xml``, ``.mjcf``), a table of Denavit
-        and Hartenberg (``.csv``, ``.toml``), or a ``pinocchio.Model``.
-    base, tip : first and last link of the chain (bodies in MJCF, joints of a ``pinocchio.Model``). If neither
+    source : URDF (``.urdf``, or ``.xml`` with <robot>), MJCF (``.xml``, ``.mjcf``), USD (``.usd``, ``.usda``,
+        ``.usdc``, ``.usdz``), a table of Denavit and Hartenberg (``.csv``, ``.toml``), or a
+        ``pinocchio.Model``.
+    base, tip : first and last link of the chain (bodies in MJCF and USD, joints of a ``pinocchio.Model``). If neither
         they nor the drive data state them, these are the root and the end of the only moving branch. Several
         tips, as a list, give a robot with branches.
     whole_tree : take all moving branches; joints that follow other joints are locked at zero, with a note in
         the robot file. By default, a file with several branches needs a ``tip``.
     drives : drive data, or their TOML file; by default ``arm.drives.toml`` beside ``arm.urdf``, if there is
         one. Without drive data, gears are rigid with the ratio of the file or 1, and rotors and friction are
-        those of the file. There is then a controller only if every joint of an MJCF has position targets.
+        those of the file. There is then a controller only if every joint of an MJCF or USD has position targets.
     sample_time_s : sample time [s] if the drive data state none; by default 1 ms.
 
     Links on fixed joints are merged with their parents. As in every robot file, frames are parallel to the
     base frame at zero angle. Joint angles are those of the file.
 
     Raises RobotError, with file, line and element, for everything that is no chain or tree of such joints. Raises
-    MissingExtraError for MJCF if MuJoCo is not installed.
+    MissingExtraError for MJCF without MuJoCo, and for USD without usd-core.
 
     """
     named = Path(source).name if isinstance(source, str | Path) else "a pinocchio.Model"
@@ -150,6 +153,8 @@ def _tree(path: Path) -> Tree:
     """Return the bodies of a file, in the format of its suffix or its root element."""
     if path.suffix.lower() in (".csv", ".toml"):
         return read_dh(path)
+    if path.suffix.lower() in USD_SUFFIXES:
+        return read_usd(path)
     root = read_xml(path)
     if root.tag == "robot":
         return read_urdf(root, path)

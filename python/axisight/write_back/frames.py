@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from axisight.effects.stated import BASE_TILT, JOINT_ZERO, LINK_GEOMETRY
 from axisight.robot import Robot
-from axisight.robot_import.bodies import Tree
+from axisight.robot_import.bodies import Pose, Tree
 from axisight.robot_import.chain import Chain
 from axisight.robot_import.xml_tree import Element
 from axisight.write_back.placed import Placed, said
@@ -32,7 +32,7 @@ FRAME_EFFECTS = (LINK_GEOMETRY, JOINT_ZERO[0], BASE_TILT)
 
 
 @dataclass
-class _Move:
+class Move:
     """Change of a joint of the chain: its position shifted [m] and everything rotated, in the base frame.
 
     ``turned``: rotation of what the joint stands on. ``zero_rad``: change of the joint's zero.
@@ -56,17 +56,27 @@ def write_frames(
     ``model``: the tree of the file and its chain.
     """
     placed = Placed()
-    moves: dict[int, _Move] = {}
     urdf = root.tag == "robot"
+    tilts = [] if urdf else [cause for cause in causes if cause.effect == BASE_TILT]
+    for cause in tilts:
+        _done(placed, [cause], _gravity(edits, root, model[1], cause))
+    moves, behind = moves_of(robot, [cause for cause in causes if cause not in tilts])
+    for at, move in moves.items():
+        write = _urdf if urdf else _mjcf
+        _done(placed, move.causes, write(edits, root, model, at, move))
+    return placed.joined(behind)
+
+
+def moves_of(robot: Robot, causes: Sequence[Cause]) -> tuple[dict[int, Move], Placed]:
+    """Return the moves of joints (from 0) by number, and the causes behind the last joint as refused."""
+    moves: dict[int, Move] = {}
+    placed = Placed()
     for cause in causes:
-        if cause.effect == BASE_TILT and not urdf:
-            _done(placed, [cause], _gravity(edits, root, model[1], cause))
-            continue
         at = _at(robot, cause)
         if at >= robot.n_joints:
             placed.refuse([cause], "behind the last axis there is none that could lie elsewhere")
             continue
-        move = moves.setdefault(at, _Move())
+        move = moves.setdefault(at, Move())
         move.causes.append(cause)
         if cause.effect == LINK_GEOMETRY:
             move.shift_m = move.shift_m + _vector(cause)
@@ -74,10 +84,7 @@ def write_frames(
             move.turned = _level(cause).inv()
         else:
             move.zero_rad += cause.parameters[JOINT_ZERO[1]].value
-    for at, move in moves.items():
-        write = _urdf if urdf else _mjcf
-        _done(placed, move.causes, write(edits, root, model, at, move))
-    return placed
+    return moves, placed
 
 
 def _done(placed: Placed, causes: Sequence[Cause], why: str) -> None:
@@ -114,19 +121,17 @@ def _below(tree: Tree, chain: Chain, at: int) -> Rotation:
     return Rotation.from_matrix(turned)
 
 
-def _urdf(edits: Edits, root: Element, model: tuple[Tree, Chain], at: int, move: _Move) -> str:
+def _urdf(edits: Edits, root: Element, model: tuple[Tree, Chain], at: int, move: Move) -> str:
     """Set or add the <origin> of a joint; return why that failed, empty if it did not."""
     tree, chain = model
     body = chain.joints[at].body
     joint = next(e for e in root.all("joint") if e.attributes.get("name") == body.joint)
-    below = _below(tree, chain, at)
-    tilt = below.inv() * move.turned * below
-    place = tilt.apply(body.pose.origin) + below.inv().apply(move.shift_m)
-    turned = tilt * Rotation.from_matrix(body.pose.rotation) * _about(body.axis, move.zero_rad)
-    numbers = {"xyz": place.tolist(), "rpy": turned.as_euler("xyz").tolist()}
-    if move.zero_rad == 0 and tilt.magnitude() == 0:
+    pose = moved(tree, chain, at, move)
+    turned = Rotation.from_matrix(pose.rotation)
+    numbers = {"xyz": pose.origin.tolist(), "rpy": turned.as_euler("xyz").tolist()}
+    if move.zero_rad == 0 and move.turned.magnitude() == 0:
         del numbers["rpy"]
-    if np.allclose(place, body.pose.origin, rtol=0, atol=1e-12):
+    if np.allclose(pose.origin, body.pose.origin, rtol=0, atol=1e-12):
         del numbers["xyz"]
     origin = joint.find("origin")
     if origin is None:
@@ -136,11 +141,21 @@ def _urdf(edits: Edits, root: Element, model: tuple[Tree, Chain], at: int, move:
     return ""
 
 
+def moved(tree: Tree, chain: Chain, at: int, move: Move) -> Pose:
+    """Return the pose of a moved joint (from 0) in the body that carries it."""
+    body = chain.joints[at].body
+    below = _below(tree, chain, at)
+    tilt = below.inv() * move.turned * below
+    place = tilt.apply(body.pose.origin) + below.inv().apply(move.shift_m)
+    turned = tilt * Rotation.from_matrix(body.pose.rotation) * _about(body.axis, move.zero_rad)
+    return Pose(turned.as_matrix(), place)
+
+
 def _about(axis: Array, angle_rad: float) -> Rotation:
     return Rotation.from_rotvec(angle_rad * axis / np.linalg.norm(axis))
 
 
-def _mjcf(edits: Edits, root: Element, model: tuple[Tree, Chain], at: int, move: _Move) -> str:
+def _mjcf(edits: Edits, root: Element, model: tuple[Tree, Chain], at: int, move: Move) -> str:
     """Set the position of a body and the reference of its joint; return why that failed, else empty."""
     tree, chain = model
     joint = chain.joints[at].body
@@ -164,7 +179,7 @@ def _mjcf(edits: Edits, root: Element, model: tuple[Tree, Chain], at: int, move:
     return ""
 
 
-def _why_not(root: Element, body: Element | None, own: Element | None, move: _Move) -> str:
+def _why_not(root: Element, body: Element | None, own: Element | None, move: Move) -> str:
     """Return why the text of a joint and its body cannot be changed in an MJCF; empty if it can."""
     if body is None or own is None:
         return "its body or joint stands in another file or has no name"
@@ -184,7 +199,7 @@ def _all(root: Element, tag: str) -> Iterator[Element]:
     return (e for e in root.walk() if e.tag == tag)
 
 
-def _of(move: _Move, effect: str) -> list[Cause]:
+def _of(move: Move, effect: str) -> list[Cause]:
     return [cause for cause in move.causes if cause.effect == effect]
 
 

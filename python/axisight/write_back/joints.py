@@ -66,19 +66,19 @@ def write_joint(
         by_number.setdefault(JOINT_NUMBERS[root.tag][cause.effect], []).append(cause)
     numbers: dict[str, float] = {}
     for name, mine in by_number.items():
-        value = _number(robot, axis, mine) - of_actuators.get(name, 0.0)
+        value = joint_number(robot, axis, mine) - of_actuators.get(name, 0.0)
         why = too_old(POLYNOMIALS_SINCE, "drag of joints") if name == DRAG_NUMBER else ""
         if why:
             placed.refuse(mine, why)
         elif value < 0:
             placed.refuse(mine, f"{name} would be {value:.4g}, and models have none below zero")
-        elif name == "stiffness" and value == 0 and _at_zero(mine[-1]):
+        elif name == "stiffness" and value == 0 and torque_at_zero(mine[-1]):
             placed.refuse(mine, "without stiffness a spring rests nowhere")
         else:
             numbers[name] = value
             if name == "stiffness":
                 unit = 1.0 if robot.axis_is_prismatic[axis] else angle_unit(root)
-                numbers |= _rest(joint, _at_zero(mine[-1]), value, unit)
+                numbers |= _rest(joint, torque_at_zero(mine[-1]), value, unit)
             placed.take(mine)
     there = [cause for cause in causes if cause.label in placed.there]
     if there:
@@ -86,8 +86,8 @@ def write_joint(
     return placed
 
 
-def _number(robot: Robot, axis: int, causes: Sequence[Cause]) -> float:
-    """Return the number that results from causes on the same number, joint side."""
+def joint_number(robot: Robot, axis: int, causes: Sequence[Cause]) -> float:
+    """Return the number [SI units, joint side] that results from causes on the same number of an axis (from 0)."""
     ratio = abs(float(robot.gear_ratio[axis]))
     first = effect_info(causes[0].effect)
     if first.stands_for is None:
@@ -117,7 +117,7 @@ def _coefficients(numbers: Mapping[str, float], drive: Drive) -> Mapping[str, Nu
     return out
 
 
-def _at_zero(spring: Cause) -> float:
+def torque_at_zero(spring: Cause) -> float:
     """Return the torque of a spring [Nm] with its joint at zero."""
     found = spring.parameters.get(JOINT_SPRING[2])
     return 0.0 if found is None else found.value

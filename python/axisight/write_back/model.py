@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -17,6 +17,7 @@ from axisight.errors import InputError
 from axisight.mujoco.torques import acts_in_gear, is_torque
 from axisight.remainder import ModelledRemainder
 from axisight.robot import Robot
+from axisight.robot.sources import USD_SUFFIXES
 from axisight.robot_file import Provenance, identified, sidecar_path, write_identified
 from axisight.robot_import.bodies import Drive
 from axisight.robot_import.drives import DriveData
@@ -34,6 +35,7 @@ from axisight.write_back.mjcf.readings import READING_EFFECTS, write_readings
 from axisight.write_back.modelled import REMAINDER, TWICE, Own, why_not, with_modelled
 from axisight.write_back.placed import Labelled, Placed, doubt
 from axisight.write_back.refitted import Refitted, refitted_gains
+from axisight.write_back.usd import check_usd_target, write_usd
 from axisight.write_back.xml_edits import Edits
 
 if TYPE_CHECKING:
@@ -83,13 +85,14 @@ def write_model(
 
     source
         What ``robot`` was read from. A robot file or a preset is written as a robot file (``.toml``) with all
-        causes as effects. A URDF or MJCF is written in its own format, or as a robot file.
+        causes as effects. A URDF, MJCF or USD is written in its own format, or as a robot file.
     target
         File to write. In a URDF or MJCF all other bytes stay. Each changed number has a comment with cause,
         value, interval, probability and what the data cannot tell from it. Both formats take dry and viscous
         friction of joints, masses, centres of mass and inertias of links, a load on the last link, positions
         of axes, zeros of joints and the tilt of the base. An MJCF also takes rotors (armature), springs of
-        joints, and gains, limits, delays and lags of motors.
+        joints, and gains, limits, delays and lags of motors. For a USD the new file is a layer over the old
+        one, which it needs beside it; it takes what a URDF takes, and also rotors, springs, gains and limits.
     refit
         `Diagnosis.refit`: relative changes [1] by name. Gains of a controller with position targets
         (``j1.kp``) go to the robot file, or to the actuators of an MJCF. All other re-fitted values stay
@@ -104,7 +107,7 @@ def write_model(
         `Diagnosis.remainder.modelled`: it goes into the table ``[remainder]`` of a robot file, with the re-fitted
         own parameters if it belongs to them. URDF and MJCF have no place for it.
 
-    Raises InputError as `check_target` does, and for a ``source`` that is no URDF or MJCF in UTF-8.
+    Raises InputError as `check_target` does, and for a ``source`` that is no USD, or URDF or MJCF in UTF-8.
     """
     check_target(source, target, overwrite=overwrite)
     path, gains = Path(target), refitted_gains(robot, refit)
@@ -136,6 +139,9 @@ def check_target(source: Path | str, target: Path | str, *, overwrite: bool = Fa
     storage.check_target(path, overwrite=overwrite)
     if kind == ".toml":
         storage.check_target(sidecar_path(path), overwrite=overwrite)
+        return
+    if Path(source).suffix.lower() in USD_SUFFIXES:
+        check_usd_target(Path(source), path)
         return
     if kind not in _KINDS or Path(source).suffix.lower() != kind:
         raise InputError(
@@ -177,7 +183,10 @@ def _as_robot_file(
 def _as_model(
     origin: _Source, robot: Robot, found: _Found, path: Path, *, play_joints: bool
 ) -> Written:
-    source, (causes, gains) = origin[0], found
+    source, drives = origin
+    if source.suffix.lower() in USD_SUFFIXES:
+        done = write_usd(source, drives or drive_data(source), robot, found, path)
+        return _written(path, done, found, lambda _: "USD has no number for it")
     text = source.read_bytes()
     root = parse_xml(text, str(source))
     if root.tag not in JOINT_NUMBERS:
@@ -185,18 +194,26 @@ def _as_model(
     edits = Edits(text, str(source))
     done = [
         *_on_axes(edits, root, origin, robot, found),
-        *_on_chain(edits, root, origin, robot, causes),
+        *_on_chain(edits, root, origin, robot, found[0]),
     ]
     if play_joints and root.tag == "mujoco":
-        done += _plays(edits, root, origin, robot, causes)
-    why = {label: reason for placed in done for label, reason in placed.why_not.items()}
-    there = {label for placed in done for label in placed.there} - set(why)
+        done += _plays(edits, root, origin, robot, found[0])
     try:
         storage.write_whole(path, edits.result().decode("utf-8"))
     except UnicodeDecodeError:
         raise InputError(f"{source}: expected a text in UTF-8 to write back to") from None
+    return _written(path, done, found, lambda effect: _no_number(root, effect))
+
+
+def _written(
+    path: Path, done: Sequence[Placed], found: _Found, no_place: Callable[[Effect], str]
+) -> Written:
+    """Return the record of a written model; ``no_place`` says why its format cannot state an effect."""
+    causes, gains = found
+    why = {label: reason for placed in done for label, reason in placed.why_not.items()}
+    there = {label for placed in done for label in placed.there} - set(why)
     out = [cause for cause in causes if cause.label not in there]
-    reasons = {c.label: why.get(c.label) or _no_number(root, c.as_effect()) for c in out}
+    reasons = {c.label: why.get(c.label) or no_place(c.as_effect()) for c in out}
     reasons |= {g.label: why.get(g.label, _NO_LAW) for g in gains if g.label not in there}
     every: list[Labelled] = [*causes, *gains]
     return Written(

@@ -1,4 +1,4 @@
-"""What docs/models.md and docs/mujoco.md show runs, and prints what the pages say."""
+"""What docs/models.md, docs/mujoco.md and docs/usd.md show runs, and prints what the pages say."""
 
 import re
 from pathlib import Path
@@ -16,7 +16,8 @@ def page(repository: Path) -> str:
 
 @pytest.fixture(scope="module")
 def blocks(repository: Path, page: str) -> list[str]:
-    text = page + (repository / "docs" / "mujoco.md").read_text(encoding="utf-8")
+    more = [repository / "docs" / f"{name}.md" for name in ("mujoco", "usd")]
+    text = page + "".join(other.read_text(encoding="utf-8") for other in more)
     return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
 
 

@@ -94,8 +94,8 @@ WriteReport = Annotated[
 WriteModel = Annotated[
     str | None,
     _text(
-        "Write the simulator with the causes found to this file (.toml, or .urdf or .xml where that was "
-        "diagnosed). Needs a server with --allow-write."
+        "Write the simulator with the causes found to this file (.toml, or .urdf, .xml or .usda where "
+        "that was diagnosed). Needs a server with --allow-write."
     ),
 ]
 WriteExperiment = Annotated[

@@ -27,6 +27,7 @@ from axisight.cli.model_options import ModelOptions
 from axisight.cli.screen import OUT
 from axisight.logs import check_log
 from axisight.logs.guessing import guess_columns
+from axisight.robot.sources import USD_SUFFIXES
 from axisight.storage import check_targets, write_whole
 
 _KINDS = {
@@ -48,6 +49,7 @@ _KINDS = {
     ".urdf": "model",
     ".xml": "model",
     ".mjcf": "model",
+    **dict.fromkeys(USD_SUFFIXES, "model"),
     ".toml": "robot file, column map or drive data",
     ".html": "report",
 }

@@ -14,10 +14,11 @@ from axisight.logs.map_files import AnyMap
 from axisight.logs.sources import files_of, is_folder_log
 from axisight.logs.untrusted import check_log_inside
 from axisight.robot import Robot, load_robot
+from axisight.robot.sources import USD_SUFFIXES
 from axisight.robot_import import is_model_file
 
 # Suffixes of models that may stand first among the logs; tables (.csv) count as logs.
-_MODELS = (".urdf", ".xml", ".mjcf", ".toml")
+_MODELS = (".urdf", ".xml", ".mjcf", ".toml", *USD_SUFFIXES)
 _NONE_HELD = "--validation: expected a log to hold out, or at least two logs"
 
 

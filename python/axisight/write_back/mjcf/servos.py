@@ -170,7 +170,7 @@ def _changed(
     stated: tuple[float, float], causes: Sequence[Cause], refitted: Sequence[Refitted]
 ) -> tuple[float, float]:
     """Return the gains of position and speed with causes and re-fitted changes."""
-    by_cause, by_fit = _factors(causes), factors(refitted)
+    by_cause, by_fit = factors_of(causes), factors(refitted)
     kp, kv = (x * a * b for x, a, b in zip(stated, by_cause, by_fit, strict=True))
     return kp, kv
 
@@ -205,8 +205,8 @@ def _as_saturation(servo: Servo, limit: Mapping[str, Numbers]) -> Mapping[str, N
     return {"saturation": (both[1], 0.0, 0.0)}
 
 
-def _factors(causes: Sequence[Cause]) -> tuple[float, float]:
-    """Return the factors on the file's gains of position and speed."""
+def factors_of(causes: Sequence[Cause]) -> tuple[float, float]:
+    """Return the factors of causes on the file's gains of position and speed."""
     position = speed = 1.0
     for cause in causes:
         found = {name: value.value for name, value in cause.parameters.items()}
