@@ -6,7 +6,7 @@ MuJoCo runs the stage and the layer along the references of the held-out log. Pr
 that the verdict states before and after, and both as Newton has them. For machines with dry friction it prints
 what a joint does under half its friction: the machine, the new model, and a stage with the number alone.
 
-    pip install newton mujoco-warp   # beside axisight[usd,mujoco]
+    pip install 'newton[sim]'   # beside axisight[usd,mujoco]
     python benches/write_back_newton.py [CASE ...]
 """
 

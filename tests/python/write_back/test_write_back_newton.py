@@ -14,7 +14,7 @@ from found_causes import several
 from newton_arm import NewtonArm
 from usd_data import arm, body, joint, saved
 
-pytest.importorskip("newton", reason="needs pip install newton mujoco-warp: docs/usd.md")
+pytest.importorskip("newton", reason="needs pip install 'newton[sim]': docs/usd.md")
 
 INERTIA, FRICTION_NM, PUSH_NM, STEP_S = 0.0016, 1.0, 0.3, 0.001
 # MuJoCo's default constraint of friction: impedance d at rest, and rate b = 2 / (dmax timeconst).
