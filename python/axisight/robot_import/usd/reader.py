@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import RobotError
+from axisight.robot import JointLimits
 from axisight.robot_import.bodies import Body, Drive, Motion, Pose, Tree, still
 from axisight.robot_import.chain import STANDARD_GRAVITY_M_S2
 from axisight.robot_import.usd import notes
@@ -226,7 +227,7 @@ class _Reader:
             None,
             self._where(prim),
             drive_of(prim, self._where(prim), self.units, turns=turns) if moving else Drive(),
-            self._limits(link, turns=turns) if moving else None,
+            self._limits(link, turns=turns) if moving else JointLimits(),
             ""
             if moving
             else f"expected a revolute, prismatic or fixed joint, got {prim.GetTypeName()}",
@@ -242,14 +243,14 @@ class _Reader:
         out[_AXES[str(token)]] = -1.0 if link.flipped else 1.0
         return out
 
-    def _limits(self, link: Link, *, turns: bool) -> tuple[float, float] | None:
-        """Return the range of a joint [rad or m]; None if it has none."""
+    def _limits(self, link: Link, *, turns: bool) -> JointLimits:
+        """Return the range of a joint [rad or m], if it has one."""
         values = [link.prim.GetAttribute(f"physics:{end}Limit").Get() for end in ("lower", "upper")]
         low, high = (float("nan") if value is None else float(value) for value in values)
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
-            return None
+            return JointLimits()
         unit = np.pi / 180 if turns else self.units.length_m
-        return low * unit, high * unit
+        return JointLimits((low * unit, high * unit))
 
     def _gravity(self) -> Array:
         """Return the gravity (3,) of the first scene [m/s^2]; USD's defaults are 9.81 m/s^2 downwards."""
