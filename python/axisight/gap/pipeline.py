@@ -13,9 +13,8 @@ from axisight.gap.facts.result import Diagnosis
 from axisight.gap.facts.settings import Settings
 from axisight.gap.fit.time_limit import TimeLimit
 from axisight.gap.intake.given import Given, check_options, given_inputs
-from axisight.gap.intake.prepared_logs import PreparedLogs, behind_gate
+from axisight.gap.intake.prepared_logs import behind_gate
 from axisight.gap.measure.by_axis import believed_by_axis
-from axisight.gap.modelled.stated import stated_says, without_stated
 from axisight.gap.screening.search_round import Progress
 from axisight.gap.search.balanced_values import with_balanced_values
 from axisight.gap.search.reported_torque import with_constants_told
@@ -27,7 +26,6 @@ from axisight.gap.simulator.tolerances import loaded
 from axisight.gap.uncertainty.beside_verdict import Wanted
 from axisight.gap.verdict.assembled import assembled
 from axisight.gap.verdict.validated import validated
-from axisight.gap.views.view import View
 from axisight.logs import AnyMap, Case, Log
 from axisight.robot import Robot
 
@@ -142,7 +140,7 @@ def _diagnosed(
     progress("looking at the logs", 0, 1)
     inputs = behind_gate(machine, fit_logs, held_logs, chosen.despite, given.simulated)
     progress("looking at the logs", 1, 1)
-    inputs, view = _compared(inputs, machine, chosen)
+    inputs, view = inputs.compared(chosen)
     if asked is not None:
         asked.check_limits(view)
     baseline = refitted(view.fitter, progress)
@@ -182,22 +180,10 @@ def _diagnosed(
         out = asked.added(out, view, seen.found, keep=keep)
         progress("designing an experiment", 1, 1)
     out = wanted.added(out, view, held_logs, seen, chosen, progress, logged=commanded is None)
-    checks = (*out.checks, *stated_says(machine), *inputs.says(view.mode, view.compared))
+    checks = (*out.checks, *inputs.says(view.mode, view.compared))
     found_faults = (*inputs.constants(out.refit), *out.findings)
     out = replace(out, simulator=inputs.simulator, checks=checks, findings=found_faults)
     logged = "recovered" if inputs.recovered else "logged"
     out.provenance["references"] = logged if view.mode == "closed_loop" else None
     out.provenance["seconds"] = round(time.monotonic() - started, 1)
     return out
-
-
-def _compared(
-    inputs: PreparedLogs, machine: Robot, settings: Settings
-) -> tuple[PreparedLogs, View]:
-    """Return the logs without the remainder that the robot file states, and their comparison."""
-    inputs, view = inputs.compared(settings)
-    if machine.remainder is None:
-        return inputs, view
-    logs = [*inputs.estimation, *inputs.validation]
-    inputs = inputs.without_remainder(without_stated(logs, machine.remainder, view, settings))
-    return inputs, inputs.view(settings)

@@ -30,7 +30,7 @@ def blocks(repository, tmp_path, monkeypatch):
 
 
 def test_commands(blocks):
-    (shell,) = (code for kind, code in blocks if kind == "sh")
+    shell, *_ = (code for kind, code in blocks if kind == "sh")
     for line in shell.strip().splitlines():
         done = CliRunner().invoke(app, line.split()[1:])
         assert done.exit_code == 0, done.output

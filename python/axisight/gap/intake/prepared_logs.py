@@ -17,6 +17,8 @@ from axisight.gap.gate import pass_gate, pass_gate_by_targets, silent_axes
 from axisight.gap.intake import user_simulator
 from axisight.gap.intake.start_of_logs import from_rest, loops_of
 from axisight.gap.measure.gear_deflections import gears_seen, gears_that_differ
+from axisight.gap.modelled.stated import SAYS as LESS_REMAINDER
+from axisight.gap.modelled.stated import without_stated
 from axisight.gap.prepare.currents import Nominal, in_torques
 from axisight.gap.prepare.joint_encoders import without_unlike_encoders
 from axisight.gap.prepare.position_targets import Commanded, with_commands
@@ -48,6 +50,7 @@ class PreparedLogs:
     - ``beside``: logs of the user's own simulator, cut like the measured ones.
     - ``in_mujoco``: whether these are runs in MuJoCo that the diagnosis made itself.
     - ``clock``: by how much torques act later than they were logged, where that was corrected.
+    - ``less_remainder``: whether the logs are less the remainder that the robot file states.
     - ``silent``: axes (from 0) whose torque carries nothing; they are not judged.
     """
 
@@ -63,6 +66,7 @@ class PreparedLogs:
     clock: TorqueClock | None = None
     in_mujoco: bool = False
     silent: tuple[int, ...] = ()
+    less_remainder: bool = False
 
     def view(self, settings: Settings) -> View:
         """Return the comparison of simulator and logs."""
@@ -73,13 +77,20 @@ class PreparedLogs:
     def compared(self, settings: Settings) -> tuple[PreparedLogs, View]:
         """Return the prepared logs and their comparison.
 
-        If logs of the user's own simulator are given, the gap is that of this simulator.
+        If logs of the user's own simulator are given, the gap is that of this simulator. A remainder that the robot
+        states is taken off the logs.
         """
-        view = self.view(settings)
-        if not self.beside:
-            return self, view
-        inputs = self.against(view, self.beside, settings)
-        return inputs, inputs.view(settings)
+        inputs, view = self, self.view(settings)
+        if self.beside:
+            inputs = self.against(view, self.beside, settings)
+            view = inputs.view(settings)
+        if self.robot.remainder is not None:
+            logs = [*inputs.estimation, *inputs.validation]
+            inputs = inputs.without_remainder(
+                without_stated(logs, self.robot.remainder, view, settings)
+            )
+            view = inputs.view(settings)
+        return inputs, view
 
     def against(self, view: View, simulated: Sequence[Log], settings: Settings) -> PreparedLogs:
         """Return the same with the gap of the user's own simulator, from its logs.
@@ -114,7 +125,13 @@ class PreparedLogs:
     def without_remainder(self, logs: Sequence[Log]) -> PreparedLogs:
         """Return the same with estimation and then validation ``logs`` without the robot's remainder."""
         n, robot = len(self.estimation), self.robot.with_remainder(None)
-        return replace(self, robot=robot, estimation=list(logs[:n]), validation=list(logs[n:]))
+        return replace(
+            self,
+            robot=robot,
+            estimation=list(logs[:n]),
+            validation=list(logs[n:]),
+            less_remainder=True,
+        )
 
     def compared_later(self, view: View, baseline: FittedModel, settings: Settings) -> PreparedLogs:
         """Return the same with logs that are compared later where the machine begins elsewhere than the simulation.
@@ -148,6 +165,7 @@ class PreparedLogs:
         """Return sentences about how the logs were prepared."""
         own_poses = any(log.start_rad is not None and log.run_up is None for log in self.estimation)
         said = [
+            LESS_REMAINDER if self.less_remainder else "",
             RUN_IN_MUJOCO if self.in_mujoco else "",
             "" if self.simulator is None else user_simulator.said(self.simulator, compared),
             FROM_OWN_POSES if own_poses and mode == "closed_loop" else "",

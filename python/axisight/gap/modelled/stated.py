@@ -13,17 +13,12 @@ from axisight.gap.views.inverse_dynamics import InverseView
 from axisight.gap.views.view import View
 from axisight.logs import Log
 from axisight.remainder import Remainder
-from axisight.robot import Robot
 
-_SAYS = (
+SAYS = (
     "The remainder of the robot file was computed along the measured motions and subtracted from "
     "the measured torque."
 )
-
-
-def stated_says(robot: Robot) -> tuple[str, ...]:
-    """Return a sentence about the remainder of a robot; none without."""
-    return () if robot.remainder is None else (_SAYS,)
+"""What a diagnosis says of it."""
 
 
 def without_stated(
