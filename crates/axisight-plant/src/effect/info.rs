@@ -221,6 +221,8 @@ impl ParameterInfo {
 }
 
 /// Description of an effect.
+// Its facts are independent of each other: every combination of them can occur.
+#[allow(clippy::struct_excessive_bools)]
 #[derive(Debug)]
 pub struct EffectInfo {
     /// Name, as in a verdict.

@@ -45,7 +45,8 @@ pub(super) fn branches<S>(joints: &[ChainJoint<S>]) -> Vec<Branch> {
     for (i, joint) in joints.iter().enumerate() {
         let before = joint.parent.map_or(0, |parent| out[parent].path);
         // Dynamics has no more joints than bits; `Plant` refuses longer chains.
-        out[i].path = before | 1_u64.checked_shl(i as u32).unwrap_or(0);
+        let own = u32::try_from(i).ok().and_then(|bit| 1_u64.checked_shl(bit));
+        out[i].path = before | own.unwrap_or(0);
         if joint.parent == i.checked_sub(1) {
             continue;
         }
