@@ -286,6 +286,9 @@ fn springs_below_the_arm_are_elastic_joints() {
         (c.stiffness, c.damping) = (spring.stiffness, spring.damping);
     }
     written.joints.insert(0, joint);
+    for (i, joint) in written.joints.iter_mut().enumerate() {
+        joint.parent = i.checked_sub(1);
+    }
     let known = plant::<f64>(&written, &[]);
     assert_eq!((mine.n_states(), mine.joint_slots()), (22, 4..11));
     let (got, want) = (run(&mine, &robot, RK4), run(&known, &written, RK4));
