@@ -283,7 +283,7 @@ mod tests {
 
     /// A loaded gear with its fastest mode at 70 Hz, and a swinging link behind it.
     fn robot() -> RobotDescription {
-        let joint = |name: &str, stiffness, drive, mass| Joint {
+        let joint = |name: &str, stiffness, drive: Option<Drive>, mass| Joint {
             name: name.to_owned(),
             parent: drive.is_none().then_some(0),
             motion: Motion::Revolute,
