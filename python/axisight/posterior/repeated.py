@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from axisight.arguments import instance
-from axisight.effects.stated import CONSTANT_TORQUE, DRY_FRICTION
+from axisight.effects.stated import CONSTANT_TORQUE, DRY_FRICTION, VISCOUS_FRICTION
 from axisight.errors import InputError
 from axisight.posterior.between_runs import BetweenRuns
 from axisight.posterior.parameter import PosteriorParameter, Simulated
@@ -20,7 +20,7 @@ from axisight.statistics.holm import holm
 
 _SCHEMA = "axisight.repeat/1"
 # Quantities of a comparison that a posterior has too; both are on the motor side.
-_SHARED = ("coulomb_friction", "torque_offset", "viscous_friction")
+_SHARED = (DRY_FRICTION[0], CONSTANT_TORQUE, VISCOUS_FRICTION)
 
 
 class Comparison(Protocol):
@@ -121,11 +121,11 @@ def _factor(
     quantity = str(one["name"]).rpartition(".")[2]
     if target.axis != one["axis"] or quantity not in _SHARED:
         return None
-    if quantity == "viscous_friction":
+    if quantity == VISCOUS_FRICTION:
         return _viscous(simulated, target)
     same = (
         (target.effect, target.quantity) == DRY_FRICTION[:2]
-        if quantity == "coulomb_friction"
+        if quantity == DRY_FRICTION[0]
         else target.effect == CONSTANT_TORQUE
     )
     return 1.0 if same else None
