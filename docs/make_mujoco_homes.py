@@ -45,6 +45,7 @@ PROBES: Mapping[str, tuple[tuple[int, int], str, str, str]] = {
 WHY = {
     "backlash": "the gear of an MJCF joint is rigid; on request, [a joint with a range](write_back.md#backlash)",
     "asymmetric_friction": "`frictionloss` is the same both ways",
+    "viscous_asymmetry": "`damping` is the same both ways",
     "load_dependent_friction": "no friction of MuJoCo depends on the load of the joint",
     "position_dependent_friction": "no friction of MuJoCo depends on the angle",
     "friction_warmup": "`thermal` of a `<dcmotor>` warms the winding by current and changes its resistance, "

@@ -136,23 +136,23 @@ def test_friction_that_a_urdf_lacks_is_found(tmp_path: Path):
 
 
 def test_causes_without_a_number_are_told_why(tmp_path: Path):
-    """An MJCF has no friction that falls from standstill: the command says what to do about it."""
+    """An MJCF has no friction that depends on the angle: the command says what to do about it."""
     bare = MJCF.replace('frictionloss="1.5" armature="0.2" stiffness="3"', "")
     bare = bare.replace('damping="0.7"', "").replace(' gear="50"', "").replace(' ref="0.3"', "")
     bare = bare.replace('<joint name="slide" type="slide" axis="1 0 0" pos="0 0.1 0"/>', "")
     path = written(tmp_path, bare, "arm.xml")
     size = np.array([1.0, 0.0])
 
-    def stribeck(_q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        return size * (1.5 + 1.5 * np.exp(-((v / 0.3) ** 2))) * np.tanh(v / 0.03)
+    def of_angle(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return size * (1.5 + 1.2 * np.sin(q)) * np.tanh(v / 0.03)
 
-    logs = [written_log(tmp_path, k, load_robot(path), stribeck) for k in range(3)]
+    logs = [written_log(tmp_path, k, load_robot(path), of_angle) for k in range(3)]
     new = tmp_path / "new.xml"
     status, said = run("diagnose", path, *logs[:2], "--validation", logs[2], "--write-model", new)
     assert status == 0, said
     assert f"model: {new}, with none" in said
     assert (
-        "no place in it for stribeck_friction@1: MJCF has no number for it: axisight.mujoco.apply adds it at "
+        "no place in it for position_dependent_friction@1: MJCF has no number for it: axisight.mujoco.apply adds it at "
         "every step"
     ) in said
     assert new.read_text() == bare

@@ -222,6 +222,6 @@ def test_fitted_gains_alone_are_a_model(tmp_path: Path):
     inputs: Any = SimpleNamespace(robot=load_robot(source), robot_source=source)
     options: Any = SimpleNamespace(given=lambda: False)
     for refit, there in (({"j1.mass": LIGHTER}, False), ({"j1.kp": LIGHTER}, True)):
-        found: Any = SimpleNamespace(causes=(), refit=refit)
+        found: Any = SimpleNamespace(causes=(), refit=refit, remainder=None)
         write_found_model(found, inputs, options, tmp_path / "new.xml", force=False)
         assert (tmp_path / "new.xml").exists() == there

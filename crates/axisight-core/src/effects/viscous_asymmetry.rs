@@ -21,7 +21,7 @@ pub(super) static INFO: EffectInfo = EffectInfo {
             unit: "Nm s/rad",
             lower: -1e4,
             upper: 1e4,
-            typical: 0.005,
+            typical: 0.01,
             ..ParameterInfo::PLAIN
         },
         SMOOTHING,

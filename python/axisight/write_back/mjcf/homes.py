@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from axisight.display.summary import summarized
 from axisight.effects.stated import (
     BALANCE,
     BASE_TILT,
@@ -38,6 +39,7 @@ from axisight.write_back.mjcf.servos import DELAYS_SINCE
 from axisight.write_back.mjcf.versions import OLDEST
 
 
+@summarized
 @dataclass(frozen=True)
 class Home:
     """Place of an effect in an MJCF.

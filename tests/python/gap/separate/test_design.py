@@ -190,8 +190,10 @@ def test_the_command_writes_references_that_can_be_run(tmp_path: Path, logs: lis
     assert done.exit_code == 0, done.output
     found = read_references(out / "references.parquet")
     assert found.period.shape == (1, round(SECONDS / found.sample_time_s), 1)
-    says = " ".join((out / "experiment.txt").read_text("utf-8").split())
-    assert says in " ".join(done.output.split())
+    # The screen says what to do; the file also lists the limits and where they come from.
+    says, _, limits = (out / "experiment.txt").read_text("utf-8").partition("\n")
+    assert " ".join(says.split()) in " ".join(done.output.split())
+    assert "speed" in limits and "(logs)" in limits
 
 
 def test_a_clear_case_asks_for_no_experiment(tmp_path: Path, logs: list[Log]):
