@@ -34,7 +34,7 @@ from remainder_laws import (
 )
 
 from axisight import Diagnosis, Log, Robot, Settings, diagnose, load_robot, simulate
-from axisight.remainder import Motion, Remainder, RunningRemainder
+from axisight.remainder import Remainder, RunningRemainder
 from axisight.write_back import write_model
 
 Array = NDArray[np.float64]
@@ -77,10 +77,6 @@ class LawInLoop(RunningRemainder):
         nothing = np.full(robot.n_axes, np.inf)
         super().__init__(Remainder((), nothing, nothing))
         self.robot, self.law, self.scale = robot, law, scale
-
-    def at(self, *given: object, **named: object) -> Motion:
-        """Return nothing: a law has no memory that needs a moment."""
-        raise NotImplementedError
 
     def __call__(  # type: ignore[override]
         self, time_s: float, angle: Array, speed: Array, acceleration: Array, load: Array

@@ -28,6 +28,7 @@ from axisight.logs import lowpass
 from axisight.write_back import Written, write_model
 from newton_arm import NewtonArm
 from usd_data import MJCF, arm, saved
+from write_back import reference
 
 Array = NDArray[np.float64]
 
@@ -91,20 +92,6 @@ def machine(name: str) -> str:
         assert text.count(was) == 1, was
         text = text.replace(was, has)
     return text
-
-
-def reference(run: int, t: float) -> tuple[Array, Array]:
-    """Return angle and speed of the joints [rad, rad/s] that a run asks for at a time."""
-    axis = np.arange(3)
-    # From rest, without a jump of speed or acceleration.
-    along = np.pi * min(t / 2, 1.0)
-    start, rising = (along - np.sin(along) * np.cos(along)) / np.pi, np.sin(along) ** 2
-    angle, speed = np.zeros(3), np.zeros(3)
-    for size, rate, phase in ((0.5, 0.9 + 0.25 * run, 0.3), (0.25, 2.3 + 0.3 * run, 1.0 + run)):
-        at = rate * t + phase + 1.3 * axis
-        angle += size * start * np.sin(at)
-        speed += size * (start * rate * np.cos(at) + rising * np.sin(at))
-    return angle, speed
 
 
 class Controller:
