@@ -2,9 +2,9 @@
 
 Run: python benches/diagnosis_entries.py METHOD CASES OUT [--limit N]
 
-METHOD is `axisight`, `aic` (the single best effect by AIC) or `sysid` (everything at once by mujoco.sysid). Reads only
-the folder of cases; cases that have an entry are left out, so that a stopped run goes on. A case on which a method
-fails has no entry, and counts as wrong.
+OUT is a folder for one JSON file per case, or a file of lines: NAME.jsonl. METHOD is `axisight`, `aic` (the single best
+effect by AIC) or `sysid` (everything at once by mujoco.sysid). Reads only the folder of cases; cases that have an entry
+are left out, so that a stopped run goes on. A case on which a method fails has no entry, and counts as wrong.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from axisight import Settings, diagnose
-from axisight.blind.entries import ENTRY_SCHEMA
+from axisight.blind.entries import ENTRY_SCHEMA, entries_in, entry_line
 from axisight.blind.sealed import SEAL
 from axisight.logs import Case, read_case
 from axisight.storage import write_whole
@@ -41,15 +41,16 @@ def method(name: str) -> Callable[[Case], dict[str, Any]]:
 def written(name: str, cases: Path, out: Path, limit: int | None) -> int:
     """Write the missing entries, at most ``limit``; return how many were written."""
     solve, count = method(name), 0
+    done = entries_in(out) if out.is_file() or any(out.glob("*.json")) else {}
     for seal in sorted(cases.glob(f"*/{SEAL}")):
-        target = out / f"{seal.parent.name}.json"
-        if target.exists() or count == limit:
+        case = seal.parent.name
+        if case in done or count == limit:
             continue
         started = time.process_time()
         try:
             said = solve(read_case(seal.parent, untrusted=True))
         except Exception as error:  # a method may fail in any way, and the other cases go on
-            print(f"{seal.parent.name}: failed: {type(error).__name__}: {error}", flush=True)
+            print(f"{case}: failed: {type(error).__name__}: {error}", flush=True)
             continue
         # Time of the processor: on a shared machine the wall clock says little.
         seconds = round(time.process_time() - started, 2)
@@ -57,11 +58,20 @@ def written(name: str, cases: Path, out: Path, limit: int | None) -> int:
         said["seconds"] = seconds
         if "provenance" in said:
             said["provenance"]["seconds"] = seconds
-        write_whole(target, json.dumps(said, indent=1) + "\n")
+        keep(case, said, out)
         count += 1
         causes = ", ".join(f"{c['effect']}@{c['axis']}" for c in said.get("causes", ())) or "-"
-        print(f"{target.stem}: {said['verdict']}: {causes} ({seconds:g} s)", flush=True)
+        print(f"{case}: {said['verdict']}: {causes} ({seconds:g} s)", flush=True)
     return count
+
+
+def keep(case: str, said: dict[str, Any], out: Path) -> None:
+    """Write an entry into its folder, or add its line to a file."""
+    if out.suffix == ".jsonl":
+        before = out.read_text(encoding="utf-8") if out.exists() else ""
+        write_whole(out, before + entry_line(case, said))
+    else:
+        write_whole(out / f"{case}.json", json.dumps(said, indent=1) + "\n")
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 
 from axisight.arguments import short
-from axisight.blind.entries import NO_ENTRY, as_verdict
+from axisight.blind.entries import COUNTED_ALTERNATIVE, NO_ENTRY, as_verdict, entries_in
 from axisight.blind.sealed import SEAL, seal_of
 from axisight.documents import parse_json, read_text
 from axisight.effects import effect_table
@@ -28,8 +28,6 @@ _SURE = ("explained", "explained_in_part")
 _ALWAYS = {"references": "logged"}
 # Error of the gap's reduction that still counts as right.
 _POINTS = 0.05
-# Alternatives of at least this probability count as allowed.
-_ALTERNATIVE = 0.05
 
 
 @dataclass(frozen=True)
@@ -114,35 +112,35 @@ class Share:
 def judged_cases(cases: Path, truths: Path, verdicts: Path, *, every: bool = False) -> list[Judged]:
     """Return every verdict with its truth.
 
-    ``cases``, ``truths`` and ``verdicts`` are folders; verdicts may be entries, see `as_verdict`. With ``every``,
-    each case counts: one without a verdict as failed. Raises InputError for a missing truth, for one that
-    differs from the truth its case was sealed with, for a damaged verdict, and for a folder without verdicts.
+    ``cases`` and ``truths`` are folders; ``verdicts`` may be entries, in a folder or in one file, see `as_verdict` and
+    `entries_in`. With ``every``, each case counts: one without a verdict as failed. Raises InputError for a missing
+    truth, for one that differs from the truth its case was sealed with, for a damaged verdict, and for no verdicts.
     """
-    paths = sorted(verdicts.glob("*.json"))
-    if not paths:
-        raise InputError(f"{verdicts}: expected verdicts (*.json), got none")
+    said: dict[str, tuple[str, str] | None] = dict(entries_in(verdicts))
     if every:
         sealed = sorted(seal.parent.name for seal in cases.glob(f"*/{SEAL}"))
-        paths = [verdicts / f"{name}.json" for name in sealed]
-    return [_judged_case(cases, truths, path, every=every) for path in paths]
+        said = {name: said.get(name) for name in sealed}
+    return [_judged_case(cases, truths, name, entry) for name, entry in said.items()]
 
 
-def _judged_case(cases: Path, truths: Path, path: Path, *, every: bool) -> Judged:
-    text = _read(truths / path.name, "the truth of a verdict")
-    seal = _read(cases / path.stem / SEAL, "the seal of a case").strip()
+def _judged_case(cases: Path, truths: Path, name: str, entry: tuple[str, str] | None) -> Judged:
+    held = truths / f"{name}.json"
+    text = _read(held, "the truth of a verdict")
+    seal = _read(cases / name / SEAL, "the seal of a case").strip()
     if seal_of(text) != seal:
-        raise InputError(f"{truths / path.name}: expected the truth its case was sealed with")
-    truth = _parsed(truths / path.name, text)
-    if every and not path.exists():
-        return _judged(path.stem, truth, NO_ENTRY)
-    verdict = as_verdict(_parsed(path, _read(path, "a verdict")), str(path))
+        raise InputError(f"{held}: expected the truth its case was sealed with")
+    truth = _parsed(held, text)
+    if entry is None:
+        return _judged(name, truth, NO_ENTRY)
+    said, where = entry
+    verdict = as_verdict(_parsed(where, said), where)
     try:
-        return _judged(path.stem, truth, verdict)
+        return _judged(name, truth, verdict)
     except InputError:
         raise
     except Exception as error:  # a damaged file may lack any field or hold any type
         raise InputError(
-            f"{path}: expected a verdict as axisight writes it, and its truth, got one that is damaged "
+            f"{where}: expected a verdict as axisight writes it, and its truth, got one that is damaged "
             f"({short(repr(error))})"
         ) from error
 
@@ -154,7 +152,7 @@ def _read(path: Path, what: str) -> str:
         raise InputError(f"{path}: expected {what}: {error}") from error
 
 
-def _parsed(path: Path, text: str) -> dict[str, Any]:
+def _parsed(path: Path | str, text: str) -> dict[str, Any]:
     try:
         found = parse_json(text)
     except ValueError as error:
@@ -274,7 +272,7 @@ def _judged(name: str, truth: dict[str, Any], verdict: dict[str, Any]) -> Judged
         verdict = _FAILED
     causes, n_axes = verdict["causes"], len(truth["severity"])
     withheld = [_as_named(e, {_label(c) for c in causes}, n_axes) for e in truth["effects"]]
-    likely = [a for a in verdict["alternatives"] if a["probability"] >= _ALTERNATIVE]
+    likely = [a for a in verdict["alternatives"] if a["probability"] >= COUNTED_ALTERNATIVE]
     allowed = {_label(x) for x in (*causes, *likely)}
     allowed |= {label for group in verdict["equivalent"] for label in group}
     by_label = {_label(c): c["parameters"] for c in causes}

@@ -147,8 +147,9 @@ def compare_command(
     entries: Annotated[
         list[str],
         typer.Option(
-            metavar="NAME=FOLDER",
-            help="A method and its folder of entries or verdicts, one JSON per case (repeatable).",
+            metavar="NAME=ENTRIES",
+            help="A method and its entries or verdicts: a folder with one JSON per case, or a file of lines"
+            " (.jsonl). Repeatable.",
         ),
     ],
     out: Annotated[Path | None, typer.Option(help="Write the table here (Markdown).")] = None,
@@ -171,15 +172,15 @@ def compare_command(
 
 
 def _methods(given: list[str]) -> dict[str, Path]:
-    """Return the folders of ``--entries`` by method; raise InputError for other text and for a repeated name."""
+    """Return the folders or files of ``--entries`` by method; raise InputError for other text and for a repeated name."""
     found: dict[str, Path] = {}
     for text in given:
-        name, equals, folder = text.partition("=")
-        if not (name and equals and folder):
-            raise InputError(f"--entries: expected NAME=FOLDER, got {text!r}")
+        name, equals, path = text.partition("=")
+        if not (name and equals and path):
+            raise InputError(f"--entries: expected NAME=ENTRIES, got {text!r}")
         if name in found:
             raise InputError(f"--entries: expected {name!r} once, got it twice")
-        found[name] = Path(folder)
+        found[name] = Path(path)
     return found
 
 

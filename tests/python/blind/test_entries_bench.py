@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from axisight import load_robot
-from axisight.blind.entries import as_verdict
+from axisight.blind.entries import as_verdict, entries_in
 from axisight.blind.sealed import SEAL
 from axisight.cli.demo import write_demo_case
 from axisight.effects import Effect
@@ -110,6 +110,11 @@ def test_a_stopped_run_goes_on_and_a_failure_stops_nothing(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["case_a.json", "case_c.json"]
     said = json.loads((tmp_path / "case_c.json").read_text())
     assert as_verdict(said, "case_c.json")["verdict"] == "none" and said["seconds"] >= 0
+    # One file of lines goes on in the same way.
+    lines = tmp_path / "aic.jsonl"
+    assert driver.written("aic", case.parent, lines, 1) == 1
+    assert driver.written("aic", case.parent, lines, None) == 1
+    assert list(entries_in(lines)) == ["case_a", "case_c"]
 
 
 def test_effects_of_the_baselines_are_of_the_library(bench: Any) -> None:

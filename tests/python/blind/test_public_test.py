@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from axisight.blind import calibration_error, comparison, comparison_table, judged_cases, summary
-from axisight.blind.entries import ENTRY_SCHEMA, as_verdict
+from axisight.blind.entries import ENTRY_SCHEMA, as_verdict, entries_in, entry_line
 from axisight.blind.sealed import SEAL, TRUTH_SCHEMA, seal_of
 from axisight.cli import app
 from axisight.errors import InputError
@@ -111,6 +111,56 @@ def test_an_entry_is_scored_as_the_verdict_that_it_is_part_of(drawn: Drawn) -> N
     assert one.seconds == 4.0 and one.covered == (True,)
 
 
+def test_a_file_of_lines_is_scored_as_the_folder_of_verdicts(drawn: Drawn) -> None:
+    verdict = {
+        "schema": "axisight.verdict/2",
+        "verdict": "undecidable",
+        "causes": [
+            {**FRICTION, "probability": 0.6, "parameters": {}, "gap_reduction": {"value": 0.9}}
+        ],
+        "alternatives": [
+            {**RIPPLE, "probability": 0.4},
+            {"effect": "backlash", "axis": 1, "probability": 0.01},
+        ],
+        "equivalent": [["torque_offset@1", "torque_sensor_offset@1"]],
+        "where": [{"axis": 1, "share": 0.7}, {"axis": 2, "share": 0.3}],
+        "detection_limits": [],
+        "provenance": {"seconds": 4.0},
+    }
+    drawn.entry("verdicts", "a", verdict)
+    drawn.entry("verdicts", "b", entry("none", seconds=2.0))
+    lines = drawn.at / "lines.jsonl"
+    lines.write_text(entry_line("a", verdict) + entry_line("b", entry("none", seconds=2.0)))
+    for whole, packed in zip(drawn.judged("verdicts"), drawn.judged("lines.jsonl"), strict=True):
+        fields = set(vars(whole)) - {"reduction"}
+        assert {f: vars(whole)[f] for f in fields} == {f: vars(packed)[f] for f in fields}
+    # The second line is still there when the first is gone, and its absence counts as wrong.
+    lines.write_text(entry_line("b", entry("none")))
+    assert [one.verdict for one in drawn.judged("lines.jsonl", every=True)][:2] == [
+        "failed",
+        "none",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('{"case": "a"}\n{"case": "a"}\n', "line 2: case: expected 'a' once"),
+        ('{"verdict": "none"}\n', "line 1: expected an entry with the key 'case'"),
+        ('{"case": 3}\n', "line 1: case: expected the name of a case"),
+        ("[1]\n", "line 1: expected an entry with the key 'case'"),
+        ("", "expected verdicts in a folder"),
+    ],
+)
+def test_a_damaged_file_of_lines_is_refused_by_its_line(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    path = tmp_path / "mine.jsonl"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        entries_in(path)
+
+
 @pytest.mark.parametrize(
     ("said", "message"),
     [
@@ -179,7 +229,7 @@ def test_the_command_compares(drawn: Drawn, tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     assert "| 4 cases | m |" in done.output and "| no entry | 3 |" in out.read_text()
     assert json.loads(data.read_text())["schema"] == "axisight.comparison/1"
-    for wrong, message in [("m", "NAME=FOLDER"), ("=x", "NAME=FOLDER"), ("m=", "NAME=FOLDER")]:
+    for wrong, message in [("m", "NAME=ENTRIES"), ("=x", "NAME=ENTRIES"), ("m=", "NAME=ENTRIES")]:
         done = CliRunner().invoke(app, [*given, "--entries", wrong])
         assert done.exit_code == 2 and message in done.output
     twice = CliRunner().invoke(app, [*given, "--entries", f"m={at}", "--entries", f"m={at}"])
