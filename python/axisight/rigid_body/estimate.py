@@ -17,7 +17,7 @@ from axisight.rigid_body.base import BaseParameters, base_parameters
 from axisight.rigid_body.coupling import MotorCoupling
 from axisight.rigid_body.data_rank import rank_message, reversal_findings, reversals
 from axisight.rigid_body.findings import FindingKind, IdentificationFinding
-from axisight.rigid_body.friction import DriveTerms, Side
+from axisight.rigid_body.friction import DriveTerms, ModelSide
 from axisight.rigid_body.grouping import group
 from axisight.rigid_body.least_squares import (
     Factors,
@@ -58,7 +58,7 @@ def identify_rigid_body(
     torque_nm: ArrayLike,
     *,
     terms: DriveTerms | None = None,
-    side: Side | None = None,
+    side: ModelSide | None = None,
     coupling: MotorCoupling | None = None,
     method: Method = "wls",
     base: BaseParameters | None = None,
@@ -119,7 +119,8 @@ def identify_rigid_body(
     weight = row_weights(sample_weight, (len(motion[0]), model.n_rows))
     if len(torque) != len(motion[0]):
         raise InputError(f"torque_nm: expected {len(motion[0])} rows as q, got {len(torque)}")
-    if not torque.any():
+    # Known masses alone can give the scale, as in free flight.
+    if not torque.any() and not any(known.values()):
         raise InputError("torque_nm: expected measured torques, got zeros only")
     factors = regression_factors(
         base, motion, torque, known, weight, default_blocks(blocks, len(torque)), threads
@@ -127,6 +128,7 @@ def identify_rigid_body(
 
     base, factors, findings = _separated(base, factors, motion, deficient)
     floor = 1e-12 * np.sqrt((torque**2).mean()) * np.ones(model.n_rows)
+    floor = np.maximum(floor, np.finfo(np.float64).tiny)
     noise = _column_noise(base, column_noise, factors, torque) if method == "tls" else None
     keep, now, solution, (covariance, freedom) = _eliminated(
         factors, method, floor, noise, eliminate
