@@ -119,8 +119,7 @@ def identify_rigid_body(
     weight = row_weights(sample_weight, (len(motion[0]), model.n_rows))
     if len(torque) != len(motion[0]):
         raise InputError(f"torque_nm: expected {len(motion[0])} rows as q, got {len(torque)}")
-    # Known masses alone can give the scale, as in free flight.
-    if not torque.any() and not any(known.values()):
+    if not torque.any():
         raise InputError("torque_nm: expected measured torques, got zeros only")
     factors = regression_factors(
         base, motion, torque, known, weight, default_blocks(blocks, len(torque)), threads
@@ -128,7 +127,6 @@ def identify_rigid_body(
 
     base, factors, findings = _separated(base, factors, motion, deficient)
     floor = 1e-12 * np.sqrt((torque**2).mean()) * np.ones(model.n_rows)
-    floor = np.maximum(floor, np.finfo(np.float64).tiny)
     noise = _column_noise(base, column_noise, factors, torque) if method == "tls" else None
     keep, now, solution, (covariance, freedom) = _eliminated(
         factors, method, floor, noise, eliminate

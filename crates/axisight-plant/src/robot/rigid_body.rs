@@ -27,6 +27,7 @@ pub struct ShapeError {
 }
 
 /// Check the length of a vector, and that its entries are finite; `what` names them.
+#[inline]
 pub(super) fn check_numbers(
     field: &'static str,
     x: &[f64],
