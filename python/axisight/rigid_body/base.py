@@ -249,6 +249,8 @@ def random_factor(
     # Prismatic joints get the same numbers in metres.
     q = rng.uniform(-np.pi, np.pi, shape)
     v, a = rng.normal(0.0, 2.0, shape), rng.normal(0.0, 10.0, shape)
+    # The coordinates of a base are at zero in every sample.
+    q[:, : model.first_joint] = 0.0
     if locked:
         driven = [*range(model.first_joint), *model.axis_coordinates]
         elastic = np.delete(np.arange(model.n_coordinates), driven)

@@ -101,7 +101,7 @@ def gear_sign(
     held = np.array([result.known.get(name, 0.0) for name in model.names])
     out = []
     for axis, joint in enumerate(joints):
-        row = model.first_joint + axis if model.side == "motor" else joint
+        row = model.n_base_rows + (axis if model.side == "motor" else joint - model.first_joint)
         inertia = (looks[axis] - looks[-1])[row]
         known_part = float(inertia @ held)
         value, error = _axis_alone(factors, row, inertia[result.base.columns])

@@ -38,14 +38,15 @@ _CHUNK = 4000
 class ContactCheck:
     """The wrench on a floating base that the model leaves, and where it is too large.
 
-    Arrays are over samples; index 0 of the second axis is the force, 1 the moment about the base origin.
+    Arrays are over samples; index 0 of the second axis is the force, 1 the moment about the base origin. A base that
+    is hung has only the moment about that point.
 
     residual
-        (n, 6), wrench of the model minus the measured one: force [N], moment [Nm].
+        (n, 6), wrench of the model minus the measured one: force [N], moment [Nm]; (n, 3) if hung.
     size, limit
-        (n, 2), absolute force and moment of the residual, and what noise and model may leave.
+        (n, 2), absolute force and moment of the residual, and what noise and model may leave; (n, 1) if hung.
     noise
-        (2,), standard deviation of a component of force and moment, from sample to sample.
+        (2,), standard deviation of a component of force and moment, from sample to sample; (1,) if hung.
     intervals_s
         Times (begin, end) [s] at which a size exceeds its limit, from the first sample.
     """
@@ -70,6 +71,7 @@ def contact_check(
     base: BaseMotion,
     *,
     wrench: ArrayLike | None = None,
+    hung_at_m: ArrayLike | None = None,
     parameters: ArrayLike | None = None,
     sample_time_s: float | None = None,
     tolerance: float = TOLERANCE,
@@ -77,7 +79,8 @@ def contact_check(
     """Return whether the motion of a floating base needs a wrench that the model cannot have.
 
     ``q``, ``v``, ``a`` (n, n_joints) and ``base`` are a motion, uniform in time. ``wrench`` (n, 6) is the measured
-    external force [N] and moment [Nm] on the base, by default zero. ``parameters`` are ten for each link, as in
+    external force [N] and moment [Nm] on the base, by default zero. ``hung_at_m`` (3,) [m] is the point of the base
+    at which a rope holds it, see :class:`TorqueModel`. ``parameters`` are ten for each link, as in
     ``TorqueModel(robot).nominal``, by default the nominal ones, with a relative error up to ``tolerance`` [1].
     ``sample_time_s`` [s] is by default that of the robot.
 
@@ -94,7 +97,8 @@ def contact_check(
     outside = np.zeros((n, 6)) if wrench is None else rows("wrench", wrench, 6)
     if len(outside) != n:
         raise InputError(f"wrench: expected {n} rows as q, got {len(outside)}")
-    model = TorqueModel(robot, side="base")
+    model = TorqueModel(robot, side="base", hung_at_m=hung_at_m)
+    outside = outside @ model.base_map.T
     theta = model.nominal if parameters is None else np.asarray(parameters, dtype=np.float64)
     if theta.shape != (model.n_parameters,) or not np.isfinite(theta).all():
         raise InputError(
@@ -107,8 +111,9 @@ def contact_check(
     needed, gross = _wrenches(model, motion, theta)
     residual = needed - outside
     size = _sizes(residual)
-    noise = np.array([_noise(part) for part in np.split(residual, 2, axis=1)])
-    quantile = np.sqrt(scipy.stats.chi2.isf(_FALSE / (2 * n), 3))
+    parts = np.split(residual, size.shape[1], axis=1)
+    noise = np.array([_noise(part) for part in parts])
+    quantile = np.sqrt(scipy.stats.chi2.isf(_FALSE / size.size, 3))
     limit = quantile * noise + share * (gross + _sizes(outside))
     return ContactCheck(
         residual=residual,
@@ -127,6 +132,7 @@ def refuse_contact(
     base: BaseMotion,
     *,
     wrench: ArrayLike | None = None,
+    hung_at_m: ArrayLike | None = None,
     parameters: ArrayLike | None = None,
     sample_time_s: float | None = None,
     tolerance: float = TOLERANCE,
@@ -140,6 +146,7 @@ def refuse_contact(
         a,
         base,
         wrench=wrench,
+        hung_at_m=hung_at_m,
         parameters=parameters,
         sample_time_s=step,
         tolerance=tolerance,
@@ -149,8 +156,11 @@ def refuse_contact(
     said = []
     for begin, end in found.intervals_s[:5]:
         part = slice(round(begin / step), round(end / step) + 1)
-        force, moment = found.size[part].max(axis=0)
-        said.append(f"{begin:.3f} to {end:.3f} s (up to {force:.3g} N, {moment:.3g} Nm)")
+        units = zip(
+            found.size[part].max(axis=0).tolist(), ("N", "Nm")[-found.size.shape[1] :], strict=True
+        )
+        largest = ", ".join(f"{x:.3g} {unit}" for x, unit in units)
+        said.append(f"{begin:.3f} to {end:.3f} s (up to {largest})")
     more = len(found.intervals_s) - len(said)
     raise ContactError(
         f"base: expected no wrench on it but the measured one, got one that the model cannot have, such as of a "
@@ -163,22 +173,23 @@ def refuse_contact(
 def _wrenches(
     model: TorqueModel, motion: tuple[Array, Array, Array], theta: Array
 ) -> tuple[Array, Array]:
-    """Return the wrench (n, 6) that a motion needs, and the sum of the absolute ones of the links (n, 2)."""
+    """Return the wrench (n, k) that a motion needs, and the sum of the absolute ones of the links (n, k / 3)."""
     needed, gross = [], []
     for first in range(0, len(motion[0]), _CHUNK):
         q, v, a = (x[first : first + _CHUNK] for x in motion)
         matrix = _core.torque_regressor(
             model.robot.core, q, v, a, rows=model.row_map, extras=model.extras
         )
-        by_link = (matrix * theta).reshape(len(q), 6, -1, 10).sum(axis=-1)
+        by_link = (matrix * theta).reshape(len(q), model.n_rows, -1, 10).sum(axis=-1)
         needed.append(by_link.sum(axis=-1))
-        gross.append(np.linalg.norm(by_link.reshape(len(q), 2, 3, -1), axis=2).sum(axis=-1))
+        grouped = by_link.reshape(len(q), model.n_rows // 3, 3, -1)
+        gross.append(np.linalg.norm(grouped, axis=2).sum(axis=-1))
     return np.concatenate(needed), np.concatenate(gross)
 
 
 def _sizes(wrench: Array) -> Array:
-    """Return absolute force and moment (n, 2) of wrenches (n, 6)."""
-    return np.asarray(np.linalg.norm(wrench.reshape(len(wrench), 2, 3), axis=2))
+    """Return absolute force and moment (n, k / 3) of wrenches (n, k)."""
+    return np.asarray(np.linalg.norm(wrench.reshape(len(wrench), -1, 3), axis=2))
 
 
 def _noise(part: Array) -> float:

@@ -52,7 +52,8 @@ def identify_floating(
     sample_time_s : sample time [s], for the times in the message of a ContactError; default that of the robot.
     contact : ``"refuse"``: raise ContactError if the wrench on the base differs from ``wrench`` by more than the
         nominal model and the noise allow (:func:`contact_check`); ``"keep"``: use all samples.
-    options : further arguments of :func:`identify_rigid_body`.
+    options : arguments of :class:`TorqueModel` and further ones of :func:`identify_rigid_body`. With ``hung_at_m``,
+        the robot hangs on an unmeasured force at this point, and only the moments about it count.
 
     The equations of the base have no friction and no torque constants. They give the inertias of all links up to a
     common scale, and the torques of the joints give the scale.
@@ -64,7 +65,8 @@ def identify_floating(
     if isinstance(robot, TorqueModel):
         model = robot
     else:
-        chosen = {k: options.pop(k) for k in ("terms", "side", "coupling") if k in options}
+        names = ("terms", "side", "coupling", "hung_at_m")
+        chosen = {name: options.pop(name) for name in names if name in options}
         if torque_nm is None:
             chosen.setdefault("side", "base")
         model = TorqueModel(robot, **chosen)
@@ -73,20 +75,15 @@ def identify_floating(
     outside = np.zeros((n, 6)) if wrench is None else rows("wrench", wrench, 6)
     if len(outside) != n:
         raise InputError(f"wrench: expected {n} rows as q, got {len(outside)}")
-    target = outside
-    if model.side == "base":
-        if torque_nm is not None:
-            raise InputError('torque_nm: expected none with side="base", got torques')
-    elif torque_nm is None:
-        raise InputError(f'torque_nm: expected torques with side="{model.side}", got none')
-    else:
-        torque = rows("torque_nm", torque_nm, model.n_rows - 6)
-        if len(torque) != n:
-            raise InputError(f"torque_nm: expected {n} rows as q, got {len(torque)}")
-        target = np.hstack([outside, torque])
+    target = _target(model, outside, torque_nm)
     if contact == "refuse":
         step = model.robot.sample_time_s if sample_time_s is None else sample_time_s
-        refuse_contact(model.robot, q, v, a, base, wrench=outside, sample_time_s=step)
+        hung = model.hung_at_m
+        refuse_contact(
+            model.robot, q, v, a, base, wrench=outside, hung_at_m=hung, sample_time_s=step
+        )
+    if mass_kg is not None and model.n_base_rows < 6:
+        raise InputError("mass_kg: expected none with hung_at_m, whose equations have no force")
     if mass_kg is not None:
         weight = row_weights(options.pop("sample_weight", None), target.shape)
         motion, target, options["sample_weight"] = _weighed(
@@ -98,6 +95,21 @@ def identify_floating(
             "flight the equations of the base hold for any common factor of all masses and inertias"
         )
     return identify_rigid_body(model, *motion, target, **options)
+
+
+def _target(model: TorqueModel, outside: Array, torque_nm: ArrayLike | None) -> Array:
+    """Return what the rows of a model have to equal: the external wrench, and the torques of its side."""
+    base = outside @ model.base_map.T
+    if model.side == "base":
+        if torque_nm is not None:
+            raise InputError('torque_nm: expected none with side="base", got torques')
+        return base
+    if torque_nm is None:
+        raise InputError(f'torque_nm: expected torques with side="{model.side}", got none')
+    torque = rows("torque_nm", torque_nm, model.n_rows - model.n_base_rows)
+    if len(torque) != len(base):
+        raise InputError(f"torque_nm: expected {len(base)} rows as q, got {len(torque)}")
+    return np.hstack([base, torque])
 
 
 def _weighed(

@@ -28,12 +28,14 @@ class TorqueModel:
     side : ``"joint"``: torques of all joints; ``"motor"``: motor torques of the driven axes;
         ``"base"``: the wrench on a floating base alone.
     coupling : gears between motors and joints; default the gear ratios of the robot.
+    hung_at_m : (3,) point of a floating base [m], in its frame, at which a rope or a ball joint holds it with a
+        force that nothing measures. Only the moments about this point count.
 
     Motions are always those of all joints, (n, n_joints) [rad, rad/s, rad/s^2]; on a
     prismatic joint rad reads m and Nm reads N. Motors and gears are rigid. With a floating base, six
     coordinates come before the joints: :func:`floating_motion` makes such motions, and the rows begin
     with the external force [N] and moment [Nm] on the base. Raises InputError for
-    another side, and for a coupling of another number of axes.
+    another side, a coupling of another number of axes, and ``hung_at_m`` of a fixed base.
 
     """
 
@@ -51,12 +53,16 @@ class TorqueModel:
         terms: DriveTerms | None = None,
         side: ModelSide = "joint",
         coupling: MotorCoupling | None = None,
+        hung_at_m: ArrayLike | None = None,
     ) -> None:
         if side not in ("motor", "joint", "base"):
             raise InputError(f'side: expected "motor", "joint" or "base", got {side!r}')
         if side == "base" and robot.floating_base is None:
             raise InputError('side: expected "motor" or "joint" for a fixed base, got "base"')
+        if hung_at_m is not None and robot.floating_base is None:
+            raise InputError("hung_at_m: expected none for a fixed base")
         self.robot = robot
+        self.hung_at_m = None if hung_at_m is None else rows("hung_at_m", [hung_at_m], 3)[0]
         self.terms = DriveTerms() if terms is None else terms
         self.side: ModelSide = side
         self.coupling = gear_coupling(robot) if coupling is None else coupling
@@ -69,14 +75,28 @@ class TorqueModel:
     def row_map(self) -> Array:
         """Map from forces in all coordinates to rows, shape (n_rows, n_coordinates)."""
         identity = np.eye(self.n_coordinates)
-        if self.side == "joint":
-            return identity
+        base = self.base_map @ identity[: self.first_joint]
         if self.side == "base":
-            return identity[: self.first_joint]
+            return base
+        if self.side == "joint":
+            return np.vstack([base, identity[self.first_joint :]])
         driven = identity[self.axis_coordinates]
         rows: Array = np.linalg.solve(self.coupling.torque, driven).astype(np.float64)
         rows[np.abs(rows) < 1e-14 * np.abs(rows).max()] = 0.0
-        return np.vstack([identity[: self.first_joint], rows])
+        return np.vstack([base, rows])
+
+    @cached_property
+    def base_map(self) -> Array:
+        """Map from the wrench on a floating base to its rows, shape (n_base_rows, 6); (0, 0) for a fixed base."""
+        if self.hung_at_m is None:
+            return np.eye(self.first_joint)
+        # The moment about the point p is m - p x f, and its component i is m_i + (p x e_i) . f.
+        return np.hstack([np.cross(self.hung_at_m, np.eye(3)), np.eye(3)])
+
+    @property
+    def n_base_rows(self) -> int:
+        """Rows of a floating base, which come first: 6, 3 if it is hung, 0 for a fixed base."""
+        return len(self.base_map)
 
     @cached_property
     def coordinate_names(self) -> list[str]:
@@ -132,10 +152,10 @@ class TorqueModel:
     @property
     def row_names(self) -> list[str]:
         """Names of the rows: those of their coordinates."""
-        base = self.coordinate_names[: self.first_joint]
+        base = self.coordinate_names[self.first_joint - self.n_base_rows : self.first_joint]
         if self.side == "base":
             return base
-        return self.coordinate_names if self.side == "joint" else base + self.robot.axis_names
+        return base + (self.robot.joint_names if self.side == "joint" else self.robot.axis_names)
 
     @property
     def row_dim(self) -> str:

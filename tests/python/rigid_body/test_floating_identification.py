@@ -94,6 +94,9 @@ def test_the_base_shows_every_parameter_of_its_own_link():
     assert len(found) > len(held) + 10
     # The six equations of the base alone show the same combinations.
     assert len(base_parameters(ROBOT, side="base")) == len(found)
+    # A point mass where the rope is fixed has no moment about this point.
+    hung = base_parameters(TorqueModel(ROBOT, hung_at_m=[0.2, -0.1, 0.4]))
+    assert len(hung) == len(found) - 1
 
 
 @pytest.mark.parametrize("side", ["joint", "motor"])
@@ -144,6 +147,35 @@ def test_a_load_cell_in_the_stand_gives_all_parameters():
     wanted = found.base.from_standard(found.model.nominal)
     lower, upper = found.interval(0.9999)
     assert (np.abs(found.values - wanted) <= upper - lower).all()
+
+
+def test_a_robot_on_a_rope_needs_no_load_cell():
+    rng = np.random.default_rng(6)
+    point = np.array([0.2, -0.1, 0.4])
+    # A force through the point, slow enough to be one of a rope.
+    rope = np.array([1.0, 2.0, 120.0]) + 20.0 * waves(4000, 3, 13)[0]
+    pushed = np.hstack([rope, np.cross(point, rope)])
+    q, v, a, base, torque = flight(pushed=pushed)
+    with pytest.raises(ContactError):
+        identify_floating(ROBOT, q, v, a, base, torque)
+    torque = torque + 1e-3 * np.abs(torque).max() * rng.normal(size=torque.shape)
+    rate, growth, proper = base.parts()
+    shaken = BaseMotion(rate, growth, proper + 1e-3 * rng.normal(size=proper.shape))
+    found = identify_floating(ROBOT, q, v, a, shaken, torque, hung_at_m=point)
+    assert found.model.row_names == [
+        "base.turn_x",
+        "base.turn_y",
+        "base.turn_z",
+        *ROBOT.joint_names,
+    ]
+    wanted = found.base.from_standard(found.model.nominal)
+    lower, upper = found.interval(0.9999)
+    bias = 1e-3 * np.abs(wanted).max()
+    assert (np.abs(found.values - wanted) <= upper - lower + bias).all()
+    with pytest.raises(ContactError, match=r"s \(up to [^N]* Nm\)"):
+        identify_floating(ROBOT, q, v, a, base, torque, hung_at_m=point + 0.2)
+    with pytest.raises(InputError, match="mass_kg: expected none with hung_at_m"):
+        identify_floating(ROBOT, q, v, a, base, hung_at_m=point, mass_kg=3.0)
 
 
 def test_a_contact_is_refused_with_its_times():
@@ -269,3 +301,5 @@ def test_what_has_no_floating_base_says_so():
         floating_motion(fixed, q, v, a, base)
     with pytest.raises(InputError, match='expected "motor" or "joint" for a fixed base'):
         TorqueModel(fixed, side="base")
+    with pytest.raises(InputError, match="hung_at_m: expected none for a fixed base"):
+        TorqueModel(fixed, hung_at_m=[0.0, 0.0, 0.0])

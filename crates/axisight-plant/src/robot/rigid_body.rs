@@ -27,27 +27,33 @@ pub struct ShapeError {
 }
 
 /// Check the length of a vector, and that its entries are finite; `what` names them.
-#[inline]
+#[inline(always)]
 pub(super) fn check_numbers(
     field: &'static str,
     x: &[f64],
     n: usize,
     what: &str,
 ) -> Result<(), ShapeError> {
-    if x.len() != n {
-        return Err(ShapeError {
-            field,
-            expected: format!("{n} {what}"),
-            got: x.len().to_string(),
-        });
+    if x.len() == n && x.iter().all(|v| v.is_finite()) {
+        return Ok(());
     }
-    match x.iter().position(|v| !v.is_finite()) {
-        None => Ok(()),
-        Some(i) => Err(ShapeError {
-            field,
-            expected: "finite values".to_owned(),
-            got: format!("{} at joint {}", x[i], i + 1),
-        }),
+    Err(refused(field, x, n, what))
+}
+
+#[cold]
+fn refused(field: &'static str, x: &[f64], n: usize, what: &str) -> ShapeError {
+    let bad = x.iter().position(|v| !v.is_finite());
+    let (expected, got) = match bad.filter(|_| x.len() == n) {
+        None => (format!("{n} {what}"), x.len().to_string()),
+        Some(i) => {
+            let got = format!("{} at joint {}", x[i], i + 1);
+            ("finite values".to_owned(), got)
+        }
+    };
+    ShapeError {
+        field,
+        expected,
+        got,
     }
 }
 
