@@ -9,7 +9,7 @@ from axisight.rigid_body.consistent import (
     prior_spread,
     pseudo_inertia,
 )
-from axisight.rigid_body.contact import ContactCheck, contact_check, refuse_contact
+from axisight.rigid_body.contact import ContactCheck, contact_check
 from axisight.rigid_body.coordinates import floating_motion
 from axisight.rigid_body.coupling import MotorCoupling, gear_coupling
 from axisight.rigid_body.drifting import track_parameters
@@ -70,7 +70,6 @@ __all__ = [
     "pseudo_inertia",
     "record_of_imu",
     "record_of_pose",
-    "refuse_contact",
     "torque_regressor",
     "track_parameters",
 ]
