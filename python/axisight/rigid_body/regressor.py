@@ -62,7 +62,9 @@ class TorqueModel:
         if hung_at_m is not None and robot.floating_base is None:
             raise InputError("hung_at_m: expected none for a fixed base")
         self.robot = robot
-        self.hung_at_m = None if hung_at_m is None else rows("hung_at_m", [hung_at_m], 3)[0]
+        self.hung_at_m = (
+            None if hung_at_m is None else rows("hung_at_m", np.atleast_2d(hung_at_m), 3)[0]
+        )
         self.terms = DriveTerms() if terms is None else terms
         self.side: ModelSide = side
         self.coupling = gear_coupling(robot) if coupling is None else coupling
