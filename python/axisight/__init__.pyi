@@ -89,6 +89,7 @@ from .report.plots import (
     plot_simulation,
 )
 from .robot import (
+    BaseMotion,
     Robot,
     load_robot,
 )
@@ -104,6 +105,7 @@ from .simulation import (
 __all__ = [
     "AxisightError",
     "BackendError",
+    "BaseMotion",
     "Case",
     "CaseError",
     "ConvergenceError",

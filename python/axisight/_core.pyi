@@ -35,6 +35,7 @@ __all__ = [
     "axis_fit",
     "axis_linearize",
     "axis_simulate",
+    "base_names",
     "check_integrator",
     "described_as",
     "design_poses",
@@ -43,6 +44,10 @@ __all__ = [
     "energy_regressor",
     "failure_kinds",
     "fit_frequency_responses",
+    "floating_base",
+    "floating_forward_dynamics",
+    "floating_inertia",
+    "floating_inverse_dynamics",
     "frequency_information",
     "frequency_response",
     "frf_local_model",
@@ -840,6 +845,30 @@ def accelerometers(
 
 def specific_force(robot: Robot, q: _Array, v: _Array, a: _Array) -> _Array:
     """Return the readings (m, n_readings) of the accelerometers [m/s^2] along motions (m, n_joints)."""
+
+def floating_base(
+    robot: Robot,
+) -> tuple[float, list[float], list[float]] | None:
+    """Return mass [kg], centre of mass [m] and inertia [kg m^2] of a floating base; None for a fixed one."""
+
+def base_names() -> list[str]:
+    """Return the names of the six coordinates of a floating base."""
+
+def floating_inertia(robot: Robot, q: _Array) -> _Array:
+    """Return inertia matrices (m, 6 + n, 6 + n) of a robot with a floating base."""
+
+def floating_inverse_dynamics(
+    robot: Robot, q: _Array, v: _Array, a: _Array, base: _Array
+) -> _Array:
+    """Return forces (m, 6 + n): wrench on the base (force, moment), joint forces.
+
+    ``base`` (m, 9) are angular velocity, angular acceleration and proper acceleration, in base axes.
+    """
+
+def floating_forward_dynamics(
+    robot: Robot, q: _Array, v: _Array, tau: _Array, angular_velocity: _Array
+) -> _Array:
+    """Return accelerations (m, 6 + n) under ``tau`` (m, 6 + n): of the base (proper, angular), of the joints."""
 
 def described_as(robot: Robot, text: str) -> Robot:
     """Return the same robot with another description; changed parameters, effects and controller stay."""

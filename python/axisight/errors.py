@@ -21,6 +21,18 @@ class RobotError(InputError):
     """A robot model cannot be used."""
 
 
+class ContactError(LogError):
+    """Something outside of the model acts on a floating base, such as a contact with the ground.
+
+    ``intervals_s`` are the times (begin, end) [s] at which it acts, from the first sample.
+    """
+
+    def __init__(self, message: str, intervals_s: tuple[tuple[float, float], ...] = ()) -> None:
+        """Keep message and intervals."""
+        super().__init__(message)
+        self.intervals_s = intervals_s
+
+
 class NotPeriodicError(InputError):
     """A signal does not repeat within its record."""
 

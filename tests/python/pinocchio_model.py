@@ -15,15 +15,22 @@ Array = NDArray[np.float64]
 
 
 def build(text: str) -> pin.Model:
-    """Return the chain or tree of all joints; all frames are parallel at zero angle."""
+    """Return the chain or tree of all joints; all frames are parallel at zero angle.
+
+    A floating base is a free flyer: its rates and forces come first, linear ones before angular ones.
+    """
     data: dict[str, Any] = tomllib.loads(text)
     model = pin.Model()
     model.gravity = pin.Motion(np.array(data["gravity"]), np.zeros(3))
-    parent = 0
+    parent = base_joint = 0
+    if data.get("base", {}).get("kind") == "floating":
+        still = pin.SE3.Identity()
+        parent = base_joint = model.addJoint(0, pin.JointModelFreeFlyer(), still, "root_joint")
+        model.appendBodyToJoint(base_joint, _inertia(data["base"]["link"]), still)
     for joint in data["joint"]:
         if "parent" in joint:
             base = joint["parent"] == "base"
-            parent = 0 if base else model.getJointId(joint["parent"])
+            parent = base_joint if base else model.getJointId(joint["parent"])
         axis = np.array(joint["axis"])
         kind = (
             pin.JointModelPrismaticUnaligned
@@ -33,11 +40,14 @@ def build(text: str) -> pin.Model:
         placement = pin.SE3(np.eye(3), np.array(joint["origin"]))
         parent = model.addJoint(parent, kind(axis), placement, joint["name"])
         if "link" in joint:
-            xx, yy, zz, xy, xz, yz = joint["link"]["inertia"]
-            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-            body = pin.Inertia(joint["link"]["mass"], np.array(joint["link"]["com"]), inertia)
-            model.appendBodyToJoint(parent, body, pin.SE3.Identity())
+            model.appendBodyToJoint(parent, _inertia(joint["link"]), pin.SE3.Identity())
     return model
+
+
+def _inertia(link: dict[str, Any]) -> pin.Inertia:
+    xx, yy, zz, xy, xz, yz = link["inertia"]
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return pin.Inertia(link["mass"], np.array(link["com"]), inertia)
 
 
 def inertia_matrix(model: pin.Model, data: pin.Data, q: Array) -> Array:

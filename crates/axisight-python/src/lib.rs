@@ -12,6 +12,7 @@ mod excitation;
 mod fit;
 mod fit_results;
 mod fit_specs;
+mod floating;
 mod frequency_fit;
 mod frf;
 mod joints;
@@ -57,6 +58,17 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(accelerometers::accelerometers, module)?)?;
     module.add_function(wrap_pyfunction!(accelerometers::specific_force, module)?)?;
     module.add_function(wrap_pyfunction!(accelerometers::described_as, module)?)?;
+    module.add_function(wrap_pyfunction!(floating::floating_base, module)?)?;
+    module.add_function(wrap_pyfunction!(floating::base_names, module)?)?;
+    module.add_function(wrap_pyfunction!(floating::floating_inertia, module)?)?;
+    module.add_function(wrap_pyfunction!(
+        floating::floating_inverse_dynamics,
+        module
+    )?)?;
+    module.add_function(wrap_pyfunction!(
+        floating::floating_forward_dynamics,
+        module
+    )?)?;
     module.add_function(wrap_pyfunction!(plant::state_at_rest, module)?)?;
     module.add_function(wrap_pyfunction!(plant::state_rates, module)?)?;
     module.add_function(wrap_pyfunction!(fit::status_advice, module)?)?;

@@ -45,7 +45,7 @@ fn regressor(
     row_map: &PyReadonlyArray2<'_, f64>,
     tuples: Vec<ExtraTuple>,
 ) -> PyResult<Regressor> {
-    let row_map = rows(row_map, "rows", robot.description.n_joints())?;
+    let row_map = rows(row_map, "rows", robot.description.n_coordinates())?;
     Regressor::new(&robot.description, &row_map, extras(tuples)?).map_err(input_error)
 }
 
@@ -120,6 +120,11 @@ pub fn energy_regressor<'py>(
     v: PyReadonlyArray2<'py, f64>,
     threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    if robot.description.floating_base.is_some() {
+        return Err(input_error(
+            "base: expected a fixed base for the energy, got a floating one",
+        ));
+    }
     let n = robot.description.n_joints();
     let identity = (0..n * n).map(|k| f64::from(u8::from(k / n == k % n)));
     let identity: Vec<f64> = identity.collect();
@@ -169,13 +174,15 @@ pub fn regression_factors<'py>(
     Ok((found.factor.into_pyarray(py).reshape(shape)?, found.lengths))
 }
 
-/// Inertial parameters of the links with mass, ten each, and the joints of these links.
+/// Inertial parameters of the links with mass, ten each, and the joints of these links. A floating
+/// base has the last of its six joints, which come first.
 #[pyfunction]
 pub fn inertial_parameters<'py>(
     py: Python<'py>,
     robot: PyRef<'_, Robot>,
 ) -> (Vec<usize>, Bound<'py, PyArray1<f64>>) {
-    let joints = robot.description.joints.iter().enumerate();
+    let description = robot.description.on_base_joints();
+    let joints = description.joints.iter().enumerate();
     let loaded = joints.filter(|(_, joint)| joint.link.is_some());
     let links = loaded.map(|(i, _)| i).collect();
     (links, array1(py, link_parameters(&robot.description)))

@@ -49,6 +49,13 @@ def import_command(
             help="Take all moving branches. Joints that follow other joints are locked at zero.",
         ),
     ] = False,
+    floating: Annotated[
+        bool,
+        typer.Option(
+            "--floating",
+            help="Give the robot a floating base: --base, else the body on the free joint, else the root.",
+        ),
+    ] = False,
     force: Force = False,
 ) -> None:
     """Write a model file as a robot file, and say what could not be taken along."""
@@ -59,7 +66,7 @@ def import_command(
         if whole_tree and tip is not None:
             raise InputError(f"--whole-tree: expected no --tip beside it, got --tip {tip}")
         data = ModelOptions(base, tip, payload).drives(model, drives)
-        robot = import_robot(model, drives=data, whole_tree=whole_tree)
+        robot = import_robot(model, drives=data, whole_tree=whole_tree, floating=floating)
         if out is None:
             typer.echo(robot.toml, nl=False)
             return

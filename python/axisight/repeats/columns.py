@@ -17,6 +17,7 @@ from axisight.rigid_body.motion import MotionEstimate
 from axisight.rigid_body.regressor import TorqueModel
 from axisight.robot import Robot
 from axisight.robot.branches import refuse_branches
+from axisight.robot.fixed_base import refuse_floating
 
 Array = NDArray[np.float64]
 
@@ -133,6 +134,7 @@ def _of_robot(motions: RunMotions, robot: Robot) -> Columns:
     if robot.n_axes != n_axes:
         raise InputError(f"robot: expected {n_axes} axes as the logs, got {robot.n_axes}")
     refuse_branches(robot, "the comparison of runs")
+    refuse_floating(robot, "the comparison of runs")
     model = TorqueModel(robot, terms=USUAL_TERMS, side="motor")
     joint = [joint_motion(model, motion) for motion in motions.runs]
     q, v, a, torque = (np.concatenate(parts) for parts in zip(*joint, strict=True))

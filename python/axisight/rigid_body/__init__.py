@@ -1,6 +1,7 @@
 """Rigid-body identification: torques linear in masses, inertias and friction (thesis 4.3)."""
 
 from axisight.rigid_body.base import BaseParameters, base_parameters
+from axisight.rigid_body.base_record import FloatingRecord, record_of_imu, record_of_pose
 from axisight.rigid_body.consistent import (
     ConsistentParameters,
     consistent_parameters,
@@ -8,6 +9,8 @@ from axisight.rigid_body.consistent import (
     prior_spread,
     pseudo_inertia,
 )
+from axisight.rigid_body.contact import ContactCheck, contact_check
+from axisight.rigid_body.coordinates import floating_motion
 from axisight.rigid_body.coupling import MotorCoupling, gear_coupling
 from axisight.rigid_body.drifting import track_parameters
 from axisight.rigid_body.energy import (
@@ -19,6 +22,7 @@ from axisight.rigid_body.energy import (
 )
 from axisight.rigid_body.estimate import identify_rigid_body
 from axisight.rigid_body.findings import FindingKind, IdentificationFinding
+from axisight.rigid_body.floating import identify_floating
 from axisight.rigid_body.fourier import FourierTrajectory
 from axisight.rigid_body.friction import USUAL_TERMS, DriveTerms
 from axisight.rigid_body.from_logs import LogIdentification, identify_logs
@@ -32,10 +36,12 @@ __all__ = [
     "USUAL_TERMS",
     "BaseParameters",
     "ConsistentParameters",
+    "ContactCheck",
     "DriveTerms",
     "EnergyEstimate",
     "EnergyRegression",
     "FindingKind",
+    "FloatingRecord",
     "FourierTrajectory",
     "IdentificationFinding",
     "LogIdentification",
@@ -47,18 +53,23 @@ __all__ = [
     "TrajectoryDesign",
     "base_parameters",
     "consistent_parameters",
+    "contact_check",
     "energy_regression",
     "energy_regressor",
     "estimate_motion",
+    "floating_motion",
     "gear_coupling",
     "identified_bodies",
     "identify_by_energy",
     "identify_consistent",
+    "identify_floating",
     "identify_logs",
     "identify_rigid_body",
     "optimize_trajectory",
     "prior_spread",
     "pseudo_inertia",
+    "record_of_imu",
+    "record_of_pose",
     "torque_regressor",
     "track_parameters",
 ]

@@ -17,7 +17,7 @@ from axisight import _core
 from axisight.display.summary import summarized
 from axisight.errors import AxisightError, InputError
 from axisight.rigid_body.coupling import MotorCoupling
-from axisight.rigid_body.friction import DriveTerms, Side
+from axisight.rigid_body.friction import DriveTerms, ModelSide
 from axisight.rigid_body.grouping import group
 from axisight.rigid_body.regressor import TorqueModel, as_model
 from axisight.robot import Robot
@@ -152,7 +152,7 @@ def base_parameters(
     robot: Robot | TorqueModel,
     *,
     terms: DriveTerms | None = None,
-    side: Side | None = None,
+    side: ModelSide | None = None,
     coupling: MotorCoupling | None = None,
     known: Iterable[str] = (),
     locked: bool = False,
@@ -245,12 +245,15 @@ def random_factor(
         raise InputError(f"seed: expected an integer not below zero, got {seed!r}")
     rng = np.random.default_rng(int(seed))
     n = max(500, 10 * len(columns))
-    shape = (n, model.robot.n_joints)
+    shape = (n, model.n_coordinates)
     # Prismatic joints get the same numbers in metres.
     q = rng.uniform(-np.pi, np.pi, shape)
     v, a = rng.normal(0.0, 2.0, shape), rng.normal(0.0, 10.0, shape)
+    # The coordinates of a base are at zero in every sample.
+    q[:, : model.first_joint] = 0.0
     if locked:
-        elastic = np.delete(np.arange(model.robot.n_joints), model.robot.axis_joints)
+        driven = [*range(model.first_joint), *model.axis_coordinates]
+        elastic = np.delete(np.arange(model.n_coordinates), driven)
         q[:, elastic] = v[:, elastic] = a[:, elastic] = 0.0
     factors, _ = _core.regression_factors(
         model.robot.core,

@@ -86,10 +86,12 @@ def gear_sign(
     negative if gear ratio, angle or torque of the axis has the wrong sign, whatever the other axes do.
     """
     model = result.model
-    joints = model.robot.axis_joints
+    if model.side == "base":
+        return []
+    joints = model.axis_coordinates
     q = motion[0][:: max(1, len(motion[0]) // LOOKS)]
     # Unit acceleration of each motor (or joint) alone, and one row without acceleration.
-    units = np.zeros((len(joints) + 1, model.robot.n_joints))
+    units = np.zeros((len(joints) + 1, model.n_coordinates))
     alone = np.linalg.inv(model.coupling.position).T
     units[:-1, joints] = alone if model.side == "motor" else np.eye(len(joints))
     at = np.tile(q, (len(units), 1))
@@ -99,12 +101,12 @@ def gear_sign(
     held = np.array([result.known.get(name, 0.0) for name in model.names])
     out = []
     for axis, joint in enumerate(joints):
-        row = axis if model.side == "motor" else joint
+        row = model.n_base_rows + (axis if model.side == "motor" else joint - model.first_joint)
         inertia = (looks[axis] - looks[-1])[row]
         known_part = float(inertia @ held)
         value, error = _axis_alone(factors, row, inertia[result.base.columns])
         if value + known_part < -CLEARLY * error:
-            name = model.robot.joint_names[joint]
+            name = model.coordinate_names[joint]
             text = (
                 f"{name}: by itself its torque wants a negative inertia, {value + known_part:.3g} "
                 f"+- {error:.2g} kg m^2: torque and acceleration have opposite signs. Check the "

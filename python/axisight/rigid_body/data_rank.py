@@ -74,10 +74,10 @@ def rank_message(
 def _advice(base: BaseParameters, shares: dict[str, float], motion: tuple[Array, ...]) -> str:
     """Return advice on how to change the experiment."""
     _, v, a = motion
-    names = base.model.robot.joint_names
+    names = base.model.coordinate_names
     advice = []
     # The advice names driven joints only, because others cannot be moved.
-    driven = base.model.robot.axis_joints
+    driven = base.model.axis_coordinates
     still = [names[j] for j in driven if np.ptp(v[:, j]) == 0]
     if still:
         advice.append(f"move {', '.join(still)} at changing speeds")

@@ -17,7 +17,7 @@ from axisight.rigid_body.base import BaseParameters, base_parameters
 from axisight.rigid_body.coupling import MotorCoupling
 from axisight.rigid_body.data_rank import rank_message, reversal_findings, reversals
 from axisight.rigid_body.findings import FindingKind, IdentificationFinding
-from axisight.rigid_body.friction import DriveTerms, Side
+from axisight.rigid_body.friction import DriveTerms, ModelSide
 from axisight.rigid_body.grouping import group
 from axisight.rigid_body.least_squares import (
     Factors,
@@ -58,7 +58,7 @@ def identify_rigid_body(
     torque_nm: ArrayLike,
     *,
     terms: DriveTerms | None = None,
-    side: Side | None = None,
+    side: ModelSide | None = None,
     coupling: MotorCoupling | None = None,
     method: Method = "wls",
     base: BaseParameters | None = None,

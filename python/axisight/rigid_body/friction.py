@@ -12,6 +12,8 @@ from axisight.errors import InputError
 
 Array = NDArray[np.float64]
 Side = Literal["motor", "joint"]
+# The equations of a torque model: the six of a floating base alone, or with those of motors or joints.
+ModelSide: TypeAlias = Literal["motor", "joint", "base"]
 Sides: TypeAlias = Side | tuple[Side, ...] | None
 
 # Kind of term, its signal in the core, its name on the motor side and on the joint side.

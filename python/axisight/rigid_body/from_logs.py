@@ -34,6 +34,7 @@ from axisight.rigid_body.reversal_window import reversal_weight
 from axisight.rigid_body.robot_values import identified_bodies
 from axisight.rigid_body.standstill import at_rest
 from axisight.robot import Robot
+from axisight.robot.fixed_base import refuse_floating
 from axisight.robot_file import Identified, Provenance, identified
 from axisight.robot_file.sidecar import known as known_number
 from axisight.robot_file.values import noted
@@ -265,6 +266,7 @@ def identify_logs(
         )
     if not isinstance(torque_held, bool | np.bool_):
         raise InputError(f"torque_held: expected True or False, got {torque_held!r}")
+    refuse_floating(robot, "identify_logs")
     model = TorqueModel(robot, terms=terms, side="motor", coupling=coupling)
     held = bool(torque_held)
     motions = [_estimate(log, robot, cutoff_hz, held) for log in given]

@@ -54,7 +54,9 @@ def link_columns(robot: Robot) -> list[Column]:
     ``inertia_yz`` about the origin of the link frame, in link axes.
     """
     links, values = _core.inertial_parameters(robot.core)
-    names = robot.joint_names
+    # A floating base has the last of its six coordinates, which come first.
+    floats = robot.floating_base is not None
+    names = [*["base"] * (6 if floats else 0), *robot.joint_names]
     return [
         Column(f"{names[joint]}.{quantity}", unit, float(value))
         for joint, block in zip(links, values.reshape(-1, len(LINK_QUANTITIES)), strict=True)
@@ -67,16 +69,17 @@ def drive_columns(
 ) -> list[Column]:
     """Return the columns of rotors, friction and offsets, axis by axis, then springs.
 
-    ``row_map`` (n_rows, n_joints) maps joint torques to the rows of the regression.
+    ``row_map`` (n_rows, n_coordinates) maps forces in all coordinates to the rows of the regression.
     """
-    joints = robot.axis_joints
-    place = np.zeros((robot.n_axes, robot.n_joints))
+    n = row_map.shape[1]
+    joints = [n - robot.n_joints + joint for joint in robot.axis_joints]
+    place = np.zeros((robot.n_axes, n))
     place[np.arange(robot.n_axes), joints] = 1.0
     # Maps from joint angles to motor angles, and from motor torques to rows.
     motor_motion = coupling.position @ place
     motor_rows = row_map @ place.T @ coupling.torque
     # In motor-side rows this is the identity, apart from rounding errors of the inverse.
-    motor_rows[np.abs(motor_rows) < 1e-13 * np.abs(motor_rows).max()] = 0.0
+    motor_rows[np.abs(motor_rows) <= 1e-13 * np.abs(motor_rows).max()] = 0.0
     nominal = robot.parameters()
     columns = []
     for axis, joint in enumerate(joints):
@@ -84,7 +87,7 @@ def drive_columns(
         for kind, signal, motor_name, joint_name in KINDS:
             for side in terms.sides(kind):
                 motor = side == "motor"
-                name = f"{robot.joint_names[joint]}.{motor_name if motor else joint_name}"
+                name = f"{robot.axis_names[axis]}.{motor_name if motor else joint_name}"
                 motion = motor_motion[axis] if motor else place[axis]
                 rows = motor_rows[:, axis] if motor else row_map[:, joint]
                 extra = (signal, motion.tolist(), rows.tolist(), *terms.settings(kind))
@@ -95,14 +98,16 @@ def drive_columns(
 
 def _springs(robot: Robot, nominal: dict[str, float], row_map: Array) -> list[Column]:
     columns = []
+    n = row_map.shape[1]
+    first = n - robot.n_joints
     for joint in sorted(set(range(robot.n_joints)) - set(robot.axis_joints)):
-        motion = np.eye(robot.n_joints)[joint].tolist()
+        motion = np.eye(n)[first + joint].tolist()
         # An elastic joint has no motor, so its row is zero: inertia + K q + D q' = 0.
         for quantity, unit, signal in (
             ("stiffness", "Nm/rad", "position"),
             ("damping", "Nm s/rad", "velocity"),
         ):
             name = f"{robot.joint_names[joint]}.{quantity}"
-            extra = (signal, motion, row_map[:, joint].tolist(), 0.0, 0.0)
+            extra = (signal, motion, row_map[:, first + joint].tolist(), 0.0, 0.0)
             columns.append(Column(name, unit, nominal[name], extra))
     return columns

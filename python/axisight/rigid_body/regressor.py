@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from axisight import _core
 from axisight.errors import InputError
 from axisight.rigid_body.coupling import MotorCoupling, gear_coupling
-from axisight.rigid_body.friction import DriveTerms, Side
+from axisight.rigid_body.friction import DriveTerms, ModelSide
 from axisight.rigid_body.parameters import Column, drive_columns, link_columns
 from axisight.robot import Robot
 
@@ -25,12 +25,17 @@ class TorqueModel:
     ----------
     robot : chain and gears. Its masses and inertias are nominal values only.
     terms : rotor, friction, offset and spring parameters; default none.
-    side : ``"joint"``: torques of all joints; ``"motor"``: motor torques of the driven axes.
+    side : ``"joint"``: torques of all joints; ``"motor"``: motor torques of the driven axes;
+        ``"base"``: the wrench on a floating base alone.
     coupling : gears between motors and joints; default the gear ratios of the robot.
+    hung_at_m : (3,) point of a floating base [m], in its frame, at which a rope or a ball joint holds it with a
+        force that nothing measures. Only the moments about this point count.
 
     Motions are always those of all joints, (n, n_joints) [rad, rad/s, rad/s^2]; on a
-    prismatic joint rad reads m and Nm reads N. Motors and gears are rigid. Raises InputError for
-    another side, and for a coupling of another number of axes.
+    prismatic joint rad reads m and Nm reads N. Motors and gears are rigid. With a floating base, six
+    coordinates come before the joints: :func:`floating_motion` makes such motions, and the rows begin
+    with the external force [N] and moment [Nm] on the base. Raises InputError for
+    another side, a coupling of another number of axes, and ``hung_at_m`` of a fixed base.
 
     """
 
@@ -46,14 +51,22 @@ class TorqueModel:
         robot: Robot,
         *,
         terms: DriveTerms | None = None,
-        side: Side = "joint",
+        side: ModelSide = "joint",
         coupling: MotorCoupling | None = None,
+        hung_at_m: ArrayLike | None = None,
     ) -> None:
-        if side not in ("motor", "joint"):
-            raise InputError(f'side: expected "motor" or "joint", got {side!r}')
+        if side not in ("motor", "joint", "base"):
+            raise InputError(f'side: expected "motor", "joint" or "base", got {side!r}')
+        if side == "base" and robot.floating_base is None:
+            raise InputError('side: expected "motor" or "joint" for a fixed base, got "base"')
+        if hung_at_m is not None and robot.floating_base is None:
+            raise InputError("hung_at_m: expected none for a fixed base")
         self.robot = robot
+        self.hung_at_m = (
+            None if hung_at_m is None else rows("hung_at_m", np.atleast_2d(hung_at_m), 3)[0]
+        )
         self.terms = DriveTerms() if terms is None else terms
-        self.side: Side = side
+        self.side: ModelSide = side
         self.coupling = gear_coupling(robot) if coupling is None else coupling
         if self.coupling.n_axes != robot.n_axes:
             raise InputError(
@@ -62,14 +75,50 @@ class TorqueModel:
 
     @cached_property
     def row_map(self) -> Array:
-        """Map from joint torques to rows, shape (n_rows, n_joints)."""
-        identity = np.eye(self.robot.n_joints)
+        """Map from forces in all coordinates to rows, shape (n_rows, n_coordinates)."""
+        identity = np.eye(self.n_coordinates)
+        base = self.base_map @ identity[: self.first_joint]
+        if self.side == "base":
+            return base
         if self.side == "joint":
-            return identity
-        driven = identity[self.robot.axis_joints]
+            return np.vstack([base, identity[self.first_joint :]])
+        driven = identity[self.axis_coordinates]
         rows: Array = np.linalg.solve(self.coupling.torque, driven).astype(np.float64)
         rows[np.abs(rows) < 1e-14 * np.abs(rows).max()] = 0.0
-        return rows
+        return np.vstack([base, rows])
+
+    @cached_property
+    def base_map(self) -> Array:
+        """Map from the wrench on a floating base to its rows, shape (n_base_rows, 6); (0, 0) for a fixed base."""
+        if self.hung_at_m is None:
+            return np.eye(self.first_joint)
+        # The moment about the point p is m - p x f, and its component i is m_i + (p x e_i) . f.
+        return np.hstack([np.cross(self.hung_at_m, np.eye(3)), np.eye(3)])
+
+    @property
+    def n_base_rows(self) -> int:
+        """Rows of a floating base, which come first: 6, 3 if it is hung, 0 for a fixed base."""
+        return len(self.base_map)
+
+    @cached_property
+    def coordinate_names(self) -> list[str]:
+        """Names of the coordinates: six of a floating base, then the joints."""
+        return self.robot.coordinate_names
+
+    @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates."""
+        return len(self.coordinate_names)
+
+    @property
+    def first_joint(self) -> int:
+        """Number of coordinates before the joints: 6 with a floating base, else 0."""
+        return self.n_coordinates - self.robot.n_joints
+
+    @property
+    def axis_coordinates(self) -> list[int]:
+        """Index among the coordinates of the joint that each axis drives."""
+        return [self.first_joint + joint for joint in self.robot.axis_joints]
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
@@ -79,7 +128,7 @@ class TorqueModel:
 
     @property
     def n_rows(self) -> int:
-        """Torques per sample: joints on the joint side, axes on the motor side."""
+        """Torques per sample: joints on the joint side, axes on the motor side; a floating base has six more."""
         return len(self.row_map)
 
     @property
@@ -104,19 +153,24 @@ class TorqueModel:
 
     @property
     def row_names(self) -> list[str]:
-        """Names of the rows: those of their joints."""
-        names = self.robot.joint_names
-        return names if self.side == "joint" else [names[j] for j in self.robot.axis_joints]
+        """Names of the rows: those of their coordinates."""
+        base = self.coordinate_names[self.first_joint - self.n_base_rows : self.first_joint]
+        if self.side == "base":
+            return base
+        return base + (self.robot.joint_names if self.side == "joint" else self.robot.axis_names)
 
     @property
     def row_dim(self) -> str:
         """Name of the dimension of rows."""
+        if self.first_joint:
+            return "row"
         return "joint" if self.side == "joint" else "axis"
 
     @property
     def row_labels(self) -> list[str] | list[int]:
-        """Coordinates of the rows: joint names, or axis numbers from 1."""
-        return self.row_names if self.side == "joint" else self.robot.axis_numbers()
+        """Coordinates of the rows: names, or axis numbers from 1 on the motor side of a fixed base."""
+        by_name = self.side == "joint" or self.first_joint
+        return self.row_names if by_name else self.robot.axis_numbers()
 
     @cached_property
     def extras(self) -> list[tuple[str, list[float], list[float], float, float]]:
@@ -124,12 +178,12 @@ class TorqueModel:
         return [column.extra for column in self.columns if column.extra is not None]
 
     def motion(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> tuple[Array, Array, Array]:
-        """Return a checked motion ``q``, ``v``, ``a`` as float64 arrays (n, n_joints).
+        """Return a checked motion ``q``, ``v``, ``a`` as float64 arrays (n, n_coordinates).
 
         Raises InputError for wrong shapes and values that are not finite.
         """
         arrays = [
-            rows(name, value, self.robot.n_joints) for name, value in (("q", q), ("v", v), ("a", a))
+            rows(name, value, self.n_coordinates) for name, value in (("q", q), ("v", v), ("a", a))
         ]
         for name, array in zip(("v", "a"), arrays[1:], strict=True):
             if len(array) != len(arrays[0]):
@@ -150,7 +204,7 @@ class TorqueModel:
 def as_model(
     robot: Robot | TorqueModel,
     terms: DriveTerms | None,
-    side: Side | None,
+    side: ModelSide | None,
     coupling: MotorCoupling | None,
 ) -> TorqueModel:
     """Return the torque model of a robot with options, or the given model."""
@@ -172,7 +226,7 @@ def torque_regressor(
     a: ArrayLike,
     *,
     terms: DriveTerms | None = None,
-    side: Side = "joint",
+    side: ModelSide = "joint",
     coupling: MotorCoupling | None = None,
     threads: int = 0,
 ) -> xr.DataArray:

@@ -19,6 +19,7 @@ from axisight.errors import InputError
 from axisight.rigid_body.fourier import FourierTrajectory, series
 from axisight.rigid_body.regressor import TorqueModel
 from axisight.rigid_body.sensitivity import regressor_sensitivity
+from axisight.robot.fixed_base import refuse_floating
 
 Array = NDArray[np.float64]
 Criterion = Literal["condition", "log_det"]
@@ -208,6 +209,7 @@ class _Problem:
         self.model, self.bounds, self.harmonics = model, bounds, harmonics
         self.fundamental_hz, self.samples, self.at_rest = fundamental_hz, samples, at_rest
         robot = model.robot
+        refuse_floating(robot, "optimize_trajectory")
         self.joints = np.array(robot.axis_joints)
         self.slowest = float(bounds["velocity"].min())
         gears = float(np.abs(model.coupling.position).max())

@@ -1,6 +1,7 @@
 """Robots: reading descriptions and presets, kinematics, dynamics and linearization."""
 
 from axisight.robot.accelerometer import Accelerometer
+from axisight.robot.base_motion import BaseMotion
 from axisight.robot.description import Drive, Joint, Link, Spring
 from axisight.robot.limits import JointLimits
 from axisight.robot.loading import load_robot
@@ -8,6 +9,7 @@ from axisight.robot.robot import Robot
 
 __all__ = [
     "Accelerometer",
+    "BaseMotion",
     "Drive",
     "Joint",
     "JointLimits",

@@ -17,6 +17,7 @@ from axisight.arguments import did_you_mean, instance, positive
 from axisight.effects import Effect, core_effects, effect_of_core
 from axisight.errors import InputError
 from axisight.remainder import Remainder
+from axisight.robot import dynamics
 from axisight.robot.accelerometer import (
     Accelerometer,
     accelerometer_of,
@@ -24,7 +25,8 @@ from axisight.robot.accelerometer import (
     described_with,
 )
 from axisight.robot.axis_names import axis_number, effect_on
-from axisight.robot.description import Joint, is_chain, joint_of, moved_by_axis
+from axisight.robot.base_motion import BaseMotion
+from axisight.robot.description import Joint, Link, is_chain, joint_of, moved_by_axis
 from axisight.robot.limits import JointLimits, limits_of
 from axisight.robot.notebook import page_of
 from axisight.robot.stated_remainder import described_with_remainder, stated_remainder
@@ -141,6 +143,16 @@ class Robot:
         return is_chain(self.core.joints())
 
     @property
+    def floating_base(self) -> Link | None:
+        """The link of a floating base; None for a fixed base."""
+        return dynamics.floating_base(self.core)
+
+    @property
+    def coordinate_names(self) -> list[str]:
+        """Names of all coordinates: six of a floating base (shifts, turns), then the joints."""
+        return dynamics.coordinate_names(self.core)
+
+    @property
     def accelerometers(self) -> tuple[Accelerometer, ...]:
         """The accelerometers on its links."""
         return tuple(map(accelerometer_of, _core.accelerometers(self.core)))
@@ -152,7 +164,7 @@ class Robot:
 
     @property
     def gravity_m_s2(self) -> Array:
-        """Gravity in the base frame [m/s^2], shape (3,)."""
+        """Gravity in the base frame; in the world frame if the base floats [m/s^2], shape (3,)."""
         return np.array(self.core.gravity_m_s2)
 
     @property
@@ -415,61 +427,47 @@ class Robot:
             out.append(effect_on(effect, names or []))
         return out
 
-    def _rows(self, **arrays: ArrayLike) -> tuple[list[Array], bool]:
-        out = []
-        single = True
-        for name, value in arrays.items():
-            x = np.asarray(value, dtype=np.float64)
-            if x.ndim not in (1, 2) or x.shape[-1] != self.n_joints:
-                raise InputError(
-                    f"{name}: expected shape ({self.n_joints},) or (n, {self.n_joints}), got {x.shape}"
-                )
-            single = single and x.ndim == 1
-            out.append(np.ascontiguousarray(np.atleast_2d(x)))
-        return out, single
-
     def inertia_matrix(self, q: ArrayLike) -> Array:
         """Return M(q), shape (n_joints, n_joints) or (n, n_joints, n_joints) [kg m^2].
 
-        Raises InputError for another shape of ``q`` [rad or m].
+        With a floating base, its six coordinates come first, as in `inverse_dynamics`. Raises InputError for
+        another shape of ``q`` [rad or m].
         """
-        (rows,), single = self._rows(q=q)
-        out = self.core.inertia_matrix(rows)
-        return out[0] if single else out
+        return dynamics.inertia_matrix(self.core, q)
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Array:
         """Return Coriolis, centrifugal and gravity forces c(q, v) + g(q) [Nm or N], in the shape of ``q``.
 
         Raises InputError for other shapes of ``q`` and ``v`` than those of the class.
         """
-        (rows, rates), single = self._rows(q=q, v=v)
-        out = self.core.bias(rows, rates)
-        return out[0] if single else out
+        return dynamics.bias(self.core, q, v)
 
     def gravity(self, q: ArrayLike) -> Array:
         """Return gravity forces g(q) [Nm or N], in the shape of ``q``; raise InputError for another shape."""
-        (rows,), single = self._rows(q=q)
-        out = self.core.gravity(rows)
-        return out[0] if single else out
+        return dynamics.gravity(self.core, q)
 
-    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+    def inverse_dynamics(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, base: BaseMotion | None = None
+    ) -> Array:
         """Return joint forces M(q) a + c(q, v) + g(q) [Nm or N], without motors and springs.
 
-        The result has the shape of ``q``. Raises InputError for other shapes than those of the class.
+        The result has the shape of ``q``. With a floating base, it needs the motion ``base`` and has six more
+        columns in front: the external force [N], then the moment [Nm] on the base link, in its axes about its
+        origin. They are zero in free flight. Raises InputError for other shapes than those of the class.
         """
-        (rows, rates, accelerations), single = self._rows(q=q, v=v, a=a)
-        out = self.core.inverse_dynamics(rows, rates, accelerations)
-        return out[0] if single else out
+        return dynamics.inverse_dynamics(self.core, q, v, a, base)
 
-    def forward_dynamics(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> Array:
+    def forward_dynamics(
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, base: BaseMotion | None = None
+    ) -> Array:
         """Return joint accelerations [rad/s^2 or m/s^2] under joint forces ``tau`` [Nm or N].
 
-        The result has the shape of ``q``, ``v`` and ``tau``. Raises InputError for other shapes than those of
-        the class.
+        The result has the shape of ``q``, ``v`` and ``tau``. With a floating base, only the angular velocity of
+        ``base`` counts, and ``tau`` may have the external wrench in six more columns in front. The result then
+        has the proper acceleration [m/s^2] and the angular acceleration [rad/s^2] of the base there. Raises
+        InputError for other shapes than those of the class.
         """
-        (rows, rates, forces), single = self._rows(q=q, v=v, tau=tau)
-        out = self.core.forward_dynamics(rows, rates, forces)
-        return out[0] if single else out
+        return dynamics.forward_dynamics(self.core, q, v, tau, base)
 
     def specific_force(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
         """Return what the accelerometers read along a motion of all joints [m/s^2].
@@ -477,7 +475,8 @@ class Robot:
         Shape (n_accelerometers, 3) or (n, n_accelerometers, 3), NaN where no direction is measured. Arguments
         and errors are those of `inverse_dynamics`.
         """
-        (rows, rates, accelerations), single = self._rows(q=q, v=v, a=a)
+        dynamics.refuse_floating(self.core, "accelerometers", "leave them out")
+        (rows, rates, accelerations), single = dynamics.joint_rows(self.n_joints, q=q, v=v, a=a)
         out = _core.specific_force(self.core, rows, rates, accelerations)
         # Without readings, the core cannot say how many rows there are.
         by_place = by_direction(out.reshape(len(rows), out.shape[1]), self.accelerometers)
@@ -489,7 +488,7 @@ class Robot:
         ``q`` (n_joints,) are the joint positions [rad or m]. ``joint`` is a joint name or an index in the
         chain (from 0; -1 is the last). Raises InputError for another shape and for an unknown joint.
         """
-        (rows,), _ = self._rows(q=q)
+        (rows,), _ = dynamics.joint_rows(self.n_joints, q=q)
         return self.core.pose(rows[0].tolist(), self._joint(joint))
 
     def jacobian(
@@ -501,7 +500,7 @@ class Robot:
         ``point_m`` (3,) [m] is the point in the frame of the link of ``joint``. ``q``, ``joint`` and errors
         are as in `pose`.
         """
-        (rows,), _ = self._rows(q=q)
+        (rows,), _ = dynamics.joint_rows(self.n_joints, q=q)
         x, y, z = (float(c) for c in point_m)
         return self.core.jacobian(rows[0].tolist(), self._joint(joint), (x, y, z))
 

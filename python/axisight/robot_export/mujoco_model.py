@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from axisight.errors import InputError, MissingExtraError
 from axisight.robot import Robot
-from axisight.robot.description import Joint
+from axisight.robot.description import Joint, Link
 from axisight.robot_export.dry_friction import joint_friction_nm
 
 Array = NDArray[np.float64]
@@ -40,6 +40,7 @@ def mjcf(robot: Robot) -> str:
       minus the motor angle times r.
     - The inputs of the actuators are motor torques [Nm].
     - A massless link shares a body with the next link.
+    - A floating base is a body ``base`` with a free joint.
 
     MJCF has no place for the controller and all other effects, such as ripples and backlash. Raises InputError
     for a massless link with several joints on it, as a body of MuJoCo needs a mass.
@@ -63,7 +64,7 @@ def mjcf(robot: Robot) -> str:
 def _bodies(world: ET.Element, robot: Robot) -> None:
     """Append the bodies of a robot, each within the body that carries it; errors are those of `mjcf`."""
     friction = joint_friction_nm(robot)
-    bodies: dict[int | None, ET.Element] = {None: world}
+    bodies: dict[int | None, ET.Element] = {None: _base(world, robot)}
     # Of joints with a massless link: the body that carries them, and the joints since that body.
     waiting: dict[int | None, tuple[ET.Element, list[Joint]]] = {}
     for i, joint in enumerate(robot.joints):
@@ -84,6 +85,17 @@ def _bodies(world: ET.Element, robot: Robot) -> None:
             bodies[i] = _body(carrier, joints, friction)
 
 
+def _base(world: ET.Element, robot: Robot) -> ET.Element:
+    """Return the body that carries the first joints: the world, or a body with a free joint."""
+    link = robot.floating_base
+    if link is None:
+        return world
+    body = ET.SubElement(world, "body", name="base")
+    ET.SubElement(body, "freejoint", name="base")
+    _inertial(body, link)
+    return body
+
+
 def _body(parent: ET.Element, joints: Sequence[Joint], friction: dict[str, float]) -> ET.Element:
     """Append and return the body that these joints move; only the last joint has a link."""
     last = joints[-1]
@@ -94,14 +106,18 @@ def _body(parent: ET.Element, joints: Sequence[Joint], friction: dict[str, float
     for joint in joints:
         place = place + joint.origin_m
         _joint(body, joint, place, friction.get(joint.name, 0.0))
+    _inertial(body, last.link)
+    return body
+
+
+def _inertial(body: ET.Element, link: Link) -> None:
     ET.SubElement(
         body,
         "inertial",
-        pos=_text(last.link.com_m),
-        mass=repr(float(last.link.mass_kg)),
-        fullinertia=_text(last.link.inertia_kg_m2),
+        pos=_text(link.com_m),
+        mass=repr(float(link.mass_kg)),
+        fullinertia=_text(link.inertia_kg_m2),
     )
-    return body
 
 
 def _joint(body: ET.Element, joint: Joint, place: Array, friction: float) -> None:

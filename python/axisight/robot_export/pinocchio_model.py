@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 
 from axisight.errors import MissingExtraError
-from axisight.robot import Robot
+from axisight.robot import Link, Robot
 from axisight.robot_export.dry_friction import joint_friction_nm
 
 
 def to_pinocchio(robot: Robot) -> Any:
     """Return a ``pinocchio.Model`` of the robot with all joints, driven and elastic, under the same names.
 
-    Its ``rnea`` equals `Robot.inverse_dynamics`. Rotors are in ``rotorInertia`` [kg m^2, motor side] and
+    Its ``rnea`` equals `Robot.inverse_dynamics`. A floating base is a ``JointModelFreeFlyer`` with the name
+    ``root_joint``. Rotors are in ``rotorInertia`` [kg m^2, motor side] and
     ``rotorGearRatio`` (motor angle per joint angle). Viscous friction is in ``damping``, Coulomb friction in
     the limits of dry friction, both joint-side. The model has no place for springs of gears and elastic
     joints, the controller and all other effects. Raises MissingExtraError if Pinocchio is not installed.
@@ -28,6 +29,11 @@ def to_pinocchio(robot: Robot) -> Any:
     model.name = robot.name
     model.gravity.linear = robot.gravity_m_s2
     friction = joint_friction_nm(robot)
+    base = 0  # Joint 0 of Pinocchio is the universe.
+    if robot.floating_base is not None:
+        flyer, still = pinocchio.JointModelFreeFlyer(), pinocchio.SE3.Identity()
+        base = model.addJoint(0, flyer, still, "root_joint")
+        model.appendBodyToJoint(base, _inertia(pinocchio, robot.floating_base), still)
     for joint in robot.joints:
         kind = (
             pinocchio.JointModelPrismaticUnaligned
@@ -35,13 +41,10 @@ def to_pinocchio(robot: Robot) -> Any:
             else pinocchio.JointModelRevoluteUnaligned
         )
         placement = pinocchio.SE3(np.eye(3), joint.origin_m)
-        # Joint 0 of Pinocchio is the base.
-        before = 0 if joint.parent is None else joint.parent + 1
+        before = base if joint.parent is None else base + joint.parent + 1
         parent = model.addJoint(before, kind(joint.axis), placement, joint.name)
         if joint.link is not None:
-            xx, yy, zz, xy, xz, yz = joint.link.inertia_kg_m2
-            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-            body = pinocchio.Inertia(joint.link.mass_kg, joint.link.com_m, inertia)
+            body = _inertia(pinocchio, joint.link)
             model.appendBodyToJoint(parent, body, pinocchio.SE3.Identity())
         v = model.joints[parent].idx_v
         if joint.drive is not None:
@@ -52,3 +55,9 @@ def to_pinocchio(robot: Robot) -> Any:
         dry = friction.get(joint.name, 0.0)
         model.lowerDryFrictionLimit[v], model.upperDryFrictionLimit[v] = -dry, dry
     return model
+
+
+def _inertia(pinocchio: Any, link: Link) -> Any:
+    xx, yy, zz, xy, xz, yz = link.inertia_kg_m2
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return pinocchio.Inertia(link.mass_kg, link.com_m, inertia)

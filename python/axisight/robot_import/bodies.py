@@ -161,7 +161,7 @@ class Body:
     joint axis in the frame of the body. ``where`` is the place in the file, for messages. ``refused`` says
     why a chain cannot have its joint. If the body only stands for a joint, ``of`` is the body in the file
     that the joint moves. ``bare`` means that another joint of that body follows. ``follows`` is the name of a
-    joint that this joint follows.
+    joint that this joint follows. ``is_free``: the joint lets the body move in all six directions.
     """
 
     name: str
@@ -178,6 +178,7 @@ class Body:
     bare: bool = False
     of: str = ""
     follows: str = ""
+    is_free: bool = False
 
 
 @dataclass

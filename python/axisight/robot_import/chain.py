@@ -38,7 +38,8 @@ class Chain:
 
     ``end`` is the pose of the last link's frame in the file, in the frame of the last joint. ``steps`` are
     the time steps of the simulator of the file. ``gravity_m_s2`` (3,) is the share ``gravity_share`` of the
-    file's. ``holds_weight``: actuators compensate the weight.
+    file's. ``holds_weight``: actuators compensate the weight. ``base``: mass of a floating base, in its frame;
+    None for a fixed base.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Chain:
     steps: Steps | None = None
     gravity_share: float = 1.0
     holds_weight: bool = False
+    base: Mass | None = None
 
     @property
     def is_chain(self) -> bool:
@@ -65,6 +67,7 @@ def chain_of(
     tip: str | Sequence[str] | None = None,
     *,
     whole_tree: bool = False,
+    floating: bool = False,
 ) -> Chain:
     """Return the joints of a tree of bodies from one body on: a serial chain, or several branches.
 
@@ -72,10 +75,12 @@ def chain_of(
     branches. By default it is the end of the only moving branch; with ``whole_tree``, the ends of all. Bodies
     on fixed joints are merged with their parents. With a ``tip``, other moving branches and everything beyond
     a tip are locked at zero; their masses stay. With ``whole_tree``, joints that follow another joint
-    are locked at zero.
+    are locked at zero. With ``floating``, the base floats. It is then by default the body on the only free joint
+    of the file, else the root, and the frame of the base is that of this body.
 
     Raises RobotError for bodies that are not there, several branches without a ``tip``, a ``tip`` beside
-    ``whole_tree``, joints that a robot cannot have, moving bodies without mass, and inertias that no body has.
+    ``whole_tree``, joints that a robot cannot have, moving bodies without mass, inertias that no body has, and
+    several free joints without a ``base``.
     """
     root = next(iter(tree.bodies.values()))
     tips = [tip] if isinstance(tip, str) else list(tip or ())
@@ -89,7 +94,7 @@ def chain_of(
             raise RobotError(
                 f"{root.where}: --{option}: expected a link, such as {_listed(near)}, got {name!r}"
             )
-    first = root.name if base is None else base
+    first = base or (_free_body(tree) if floating else None) or root.name
     if whole_tree:
         tips = _ends(tree, first) or [first]
     elif not tips:
@@ -103,8 +108,9 @@ def chain_of(
                 f"tip {name!r}, got {first!r}"
             )
         chosen |= dict.fromkeys(path[path.index(first) :])
-    cut = _Cut(tree, first, frozenset(chosen), locks_followers=whole_tree)
+    cut = _Cut(tree, first, frozenset(chosen), locks_followers=whole_tree, floating=floating)
     joints = cut.joints(tips)
+    carried = cut.base() if floating else None
     gravity = tree.gravity_m_s2
     if gravity is None:
         gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
@@ -118,7 +124,19 @@ def chain_of(
         tree.steps,
         tree.gravity_share,
         tree.holds_weight,
+        carried,
     )
+
+
+def _free_body(tree: Tree) -> str | None:
+    """Return the body on the only free joint, None without one; raise RobotError for several."""
+    free = [body for body in tree.bodies.values() if body.is_free]
+    if len(free) > 1:
+        raise RobotError(
+            f"{free[1].where}: floating: expected one free joint, got {len(free)}: give the body that floats, "
+            f"--base, one of {_listed([body.of or body.name for body in free])}"
+        )
+    return (free[0].of or free[0].name) if free else None
 
 
 def _listed(names: Sequence[str] | dict[str, Body]) -> str:
@@ -176,11 +194,18 @@ def _ends(tree: Tree, first: str) -> list[str]:
 class _Cut:
     """The part of a tree between the body ``first`` and some tips: the bodies ``chosen``.
 
-    With ``locks_followers``, joints that follow other joints are locked at zero, not refused.
+    With ``locks_followers``, joints that follow other joints are locked at zero, not refused. A base that is
+    ``floating`` has the frame of its body; others have the axes of the root.
     """
 
     def __init__(
-        self, tree: Tree, first: str, chosen: frozenset[str], *, locks_followers: bool
+        self,
+        tree: Tree,
+        first: str,
+        chosen: frozenset[str],
+        *,
+        locks_followers: bool,
+        floating: bool,
     ) -> None:
         self.tree, self.first, self.chosen = tree, first, chosen
         self.locks_followers = locks_followers
@@ -188,8 +213,9 @@ class _Cut:
         self.following: list[str] = []
         self.carried: list[Body] = []
         # Start from the orientation in the root frame, in which the file states gravity.
-        start = Pose(_from_root(tree, tree.bodies[first]).rotation, np.zeros(3))
-        self.poses = {first: start}
+        axes = np.eye(3) if floating else _from_root(tree, tree.bodies[first]).rotation
+        self.poses = {first: Pose(axes, np.zeros(3))}
+        self.on_base: list[Mass] = []
         # The index of the joint that moves a body, None on the base.
         self.moved_by: dict[str, int | None] = {first: None}
 
@@ -203,9 +229,7 @@ class _Cut:
             masses = self._carried(body, here)
             self.poses[body.name], self.moved_by[body.name] = here, parent
             if self._is_fixed(body):
-                # Masses that are fixed to the base do not matter.
-                if parent is not None:
-                    moving[parent][2].extend(masses)
+                (self.on_base if parent is None else moving[parent][2]).extend(masses)
                 continue
             if body.refused or body.motion == "other":
                 raise RobotError(f"{body.where}: {body.refused}")
@@ -227,6 +251,18 @@ class _Cut:
             out.append(ChainJoint(body, at.origin - before, axis, mass, at.rotation, parent))
         self._moving = [body for body, _, _ in moving]
         return out
+
+    def base(self) -> Mass:
+        """Return the mass of the base and of all that is fixed to it; raise RobotError if it has none."""
+        body = self.tree.bodies[self.first]
+        mass = joined([*self._carried(body, self.poses[self.first]), *self.on_base])
+        if mass is None:
+            raise RobotError(
+                f"{body.where}: expected a mass on the floating base {self.first!r}, got none: give the body that "
+                f"floats, --base"
+            )
+        _check(body, mass, "the base")
+        return mass
 
     def end(self, tip: str) -> Pose:
         """Return the pose of a tip in the frame of the last joint that moves it."""
@@ -301,14 +337,14 @@ def _impossible(body: Body) -> str | None:
     )
 
 
-def _check(body: Body, mass: Mass | None) -> None:
-    """Raise RobotError for a moving body without mass or with an impossible inertia."""
+def _check(body: Body, mass: Mass | None, moves: str = "the joint") -> None:
+    """Raise RobotError for a moving body without mass or with an impossible inertia; ``moves`` moves it."""
     if mass is None and body.bare:
         return
     what = f"{(body.of or body.name)!r} and all that is fixed to it"
     if mass is None or mass.mass_kg <= 0:
         raise RobotError(
-            f"{body.where}: expected a mass on what the joint moves ({what}), got none: without one nothing "
+            f"{body.where}: expected a mass on what {moves} moves ({what}), got none: without one nothing "
             f"says which torque it takes"
         )
     moments = np.linalg.eigvalsh(mass.inertia_kg_m2)

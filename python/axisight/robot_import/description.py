@@ -77,8 +77,10 @@ def description(chain: Chain, drives: DriveData, source: str) -> str:
         "name": chain.name,
         "gravity": _floats(chain.gravity_m_s2),
         "sample_time": drives.sample_time or DEFAULT_SAMPLE_TIME_S,
-        "joint": tables,
     }
+    if chain.base is not None:
+        document["base"] = {"kind": "floating", "link": _link(chain.base)}
+    document["joint"] = tables
     pose = drives.operating_point or _rest(joints)
     # Zero is what a robot file without a pose means: whoever reads it sees that none was stated.
     if drives.operating_point is not None or any(pose):
@@ -222,12 +224,7 @@ def _joint(joint: ChainJoint, mass: Mass | None, drive: JointDrive) -> tuple[dic
         if (value := getattr(drive, key)) is not None:
             table[key] = value
     if mass is not None:
-        inertia = mass.inertia_kg_m2
-        table["link"] = {
-            "mass": float(mass.mass_kg),
-            "com": _floats(mass.com_m),
-            "inertia": _floats(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]),
-        }
+        table["link"] = _link(mass)
     table["drive"] = {
         "gear_ratio": float(ratio),
         "motor_inertia": float(rotor),
@@ -236,6 +233,15 @@ def _joint(joint: ChainJoint, mass: Mass | None, drive: JointDrive) -> tuple[dic
     if limits := joint.body.limits.stated():
         table["limits"] = limits
     return table, ratio
+
+
+def _link(mass: Mass) -> dict[str, Any]:
+    """Return the table of a link for the robot file."""
+    return {
+        "mass": float(mass.mass_kg),
+        "com": _floats(mass.com_m),
+        "inertia": _floats(mass.inertia_kg_m2[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]),
+    }
 
 
 def _torque_path(drive: Drive, axis: int, ratio: float) -> list[dict[str, Any]]:

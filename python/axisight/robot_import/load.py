@@ -50,6 +50,7 @@ def import_robot(
     base: str | None = None,
     tip: str | Sequence[str] | None = None,
     whole_tree: bool = False,
+    floating: bool = False,
     drives: DriveData | Path | str | None = None,
     sample_time_s: float | None = None,
 ) -> Robot:
@@ -65,6 +66,8 @@ def import_robot(
         tips, as a list, give a robot with branches.
     whole_tree : take all moving branches; joints that follow other joints are locked at zero, with a note in
         the robot file. By default, a file with several branches needs a ``tip``.
+    floating : give the robot a floating base. It is ``base``, else the body on the free joint of the file, else
+        the root, and its frame is that of the body.
     drives : drive data, or their TOML file; by default ``arm.drives.toml`` beside ``arm.urdf``, if there is
         one. Without drive data, gears are rigid with the ratio of the file or 1, and rotors and friction are
         those of the file. There is then a controller only if every joint of an MJCF or USD has position targets.
@@ -85,7 +88,9 @@ def import_robot(
     # Drive data change what the file says.
     unchanged = isinstance(source, str | Path) and drives == DriveData()
     alone = Path(source).resolve() if unchanged else None
-    tree, chain = bodies_and_chain(source, drives, base=base, tip=tip, whole_tree=whole_tree)
+    tree, chain = bodies_and_chain(
+        source, drives, base=base, tip=tip, whole_tree=whole_tree, floating=floating
+    )
 
     def built(step_s: float | None) -> Robot:
         stated = drives if step_s is None else drives.model_copy(update={"sample_time": step_s})
@@ -141,12 +146,14 @@ def bodies_and_chain(
     base: str | None = None,
     tip: str | Sequence[str] | None = None,
     whole_tree: bool = False,
+    floating: bool = False,
 ) -> tuple[Tree, Chain]:
     """Return the bodies of a model, and its chain or tree; arguments and errors as in `import_robot`."""
     tree = _tree(Path(source)) if isinstance(source, str | Path) else tree_of(source)
     tip = tip or (None if whole_tree else drives.tip)
     whole_tree = whole_tree or (drives.whole_tree and not tip)
-    return tree, chain_of(tree, base or drives.base, tip, whole_tree=whole_tree)
+    base = base or drives.base
+    return tree, chain_of(tree, base, tip, whole_tree=whole_tree, floating=floating)
 
 
 def _tree(path: Path) -> Tree:

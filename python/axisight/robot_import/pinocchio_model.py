@@ -50,6 +50,7 @@ def _body(model: Any, i: int) -> Body:
         if motion != "other"
         else f"expected joints of one degree of freedom between base and tip, got {joint.shortname()}: "
         f"choose them beyond it by base and tip",
+        is_free=joint.shortname() == "JointModelFreeFlyer",
     )
 
 

@@ -150,6 +150,7 @@ def _body(
         _limits(joint, kind),
         refused,
         follows="" if mimic is None else mimic.attributes.get("joint", "?"),
+        is_free=kind == "floating",
     )
 
 

@@ -109,8 +109,9 @@ def test_short_examples(page, snippets):
         assert names["run"].attrs["status"] == "completed"
 
 
-def test_branches(snippets, capsys):
-    (code,) = snippets("branches", "python")
+@pytest.mark.parametrize("page", ["branches", "floating_base"])
+def test_printed_numbers(page, snippets, capsys):
+    (code,) = snippets(page, "python")
     exec(code, {})
     told = [line.split("# ")[1] for line in code.splitlines() if line.startswith("print(")]
     assert capsys.readouterr().out.splitlines() == told

@@ -1,6 +1,7 @@
 //! Robot files: reads a description from TOML text, and reports errors with their line.
 
 mod accelerometers;
+mod base;
 mod document;
 mod effects;
 mod error;

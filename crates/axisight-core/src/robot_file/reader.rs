@@ -7,6 +7,7 @@
 //! of a missing key.
 
 use super::accelerometers::read_accelerometers;
+use super::base::{check_base, read_base};
 use super::document::{Entry, Section, line_at, one_of};
 use super::effects::{read_effects, read_tolerances};
 use super::error::RobotError;
@@ -36,7 +37,7 @@ const ROOT_KEYS: &[&str] = &[
 ];
 /// Keys of version 2 only.
 // The table of the remainder is for the Python package, which checks it.
-const NEWER_ROOT_KEYS: &[&str] = &["accelerometer", "effect", "remainder", "tolerances"];
+const NEWER_ROOT_KEYS: &[&str] = &["accelerometer", "base", "effect", "remainder", "tolerances"];
 const JOINT_KEYS: &[&str] = &[
     "name",
     "kind",
@@ -83,6 +84,7 @@ pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
     let mut robot = RobotDescription {
         name,
         gravity,
+        floating_base: read_base(&root)?,
         sample_time,
         joints: read_joints(&sections, version)?,
         controller: Controller::None,
@@ -93,6 +95,7 @@ pub fn read_robot(text: &str) -> Result<RobotDescription, RobotError> {
         tolerances: Vec::new(),
     };
     check_chain(&robot, &joint_list, &sections)?;
+    check_base(&robot, &sections)?;
     let n_axes = robot.n_axes();
     robot.controller = read_controller(&root, &robot, version)?;
     robot.position_noise_std = read_noise(&root)?;
@@ -262,7 +265,7 @@ fn read_compliance(
     }))
 }
 
-fn read_link(entry: &Entry) -> Result<Link, RobotError> {
+pub(super) fn read_link(entry: &Entry) -> Result<Link, RobotError> {
     let section = entry.section()?;
     section.only(LINK_KEYS)?;
     let mass = section.number("mass", Bound::Positive, "kg")?;

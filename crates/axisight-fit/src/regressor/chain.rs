@@ -80,6 +80,9 @@ impl Tree {
 
 impl Geometry {
     pub(super) fn new(robot: &RobotDescription) -> Self {
+        let floating = robot.floating_base.is_some();
+        let on_joints = floating.then(|| robot.on_base_joints());
+        let robot = on_joints.as_ref().unwrap_or(robot);
         let loaded = |(i, joint): (usize, &Joint)| joint.link.is_some().then_some(i);
         let segments: Vec<Segment> = robot.joints.iter().map(Segment::from).collect();
         Self {

@@ -52,7 +52,8 @@ pub(super) struct Scratch {
 
 impl Regressor {
     /// The regressor for the rows `row_map (n_rows, n_joints) * joint torques` of `robot`. The
-    /// columns `extras` follow those of the links.
+    /// columns `extras` follow those of the links. With a floating base, the joints are those of
+    /// [`RobotDescription::on_base_joints`].
     ///
     /// # Errors
     /// [`RegressorError`] if there is no row, or if the row map or an extra column has the wrong

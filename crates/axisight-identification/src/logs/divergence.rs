@@ -62,6 +62,7 @@ impl From<PlantError> for ProblemError {
     fn from(error: PlantError) -> Self {
         match error {
             PlantError::Mass { .. } | PlantError::TooManyJoints(_) => Self::does_not_hold(&error),
+            PlantError::FloatingBase => Self::misuse(&error),
             PlantError::Effect(error) => error.into(),
         }
     }

@@ -23,6 +23,13 @@ pub enum PlantError {
     /// The chain has more joints than the compiled code supports.
     #[error("joints: expected at most {MOST_JOINTS}, got {0}")]
     TooManyJoints(usize),
+    /// The robot has a floating base, whose motion a plant does not have.
+    #[error(
+        "base: expected a fixed base, got a floating one: simulations, linearizations and fits of \
+         them have no floating base. Take the model with a fixed base, or inverse_dynamics, \
+         forward_dynamics and identify_floating"
+    )]
+    FloatingBase,
     /// An effect is used incorrectly.
     #[error(transparent)]
     Effect(#[from] EffectError),
@@ -54,6 +61,9 @@ impl<S: Scalar> Plant<S> {
     fn bare(robot: &RobotDescription, overrides: &[(Parameter, S)]) -> Result<Self, PlantError> {
         if robot.joints.len() > MOST_JOINTS {
             return Err(PlantError::TooManyJoints(robot.joints.len()));
+        }
+        if robot.floating_base.is_some() {
+            return Err(PlantError::FloatingBase);
         }
         let mut chain = Chain::new(robot);
         for (parameter, value) in overrides {

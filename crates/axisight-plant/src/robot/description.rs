@@ -195,13 +195,15 @@ impl Controller {
     }
 }
 
-/// A robot on a fixed base, from the base to the tips.
+/// A robot on a fixed or a floating base, from the base to the tips.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotDescription {
     /// Name for people.
     pub name: String,
-    /// Gravity in the base frame [m/s^2].
+    /// Gravity in the base frame; with a floating base, in the world frame [m/s^2].
     pub gravity: [f64; 3],
+    /// The link of a floating base; `None` for a fixed base.
+    pub floating_base: Option<Link>,
     /// Sample time of controller and log, positive [s].
     pub sample_time: f64,
     /// Joints, every one behind its parent; link `i` moves with joint `i`.

@@ -16,11 +16,13 @@
 //! takes much longer than the loops. Only this code looks for branches.
 
 mod branches;
+mod floating;
 mod frame;
 mod spatial;
 mod specific_force;
 
 use self::branches::{Branch, Fork, LinkMotion, Start, branches};
+pub use self::floating::{BASE_COORDINATES, BaseMotion, FloatingBody};
 use self::frame::Frame;
 use self::spatial::{Moments, Screw};
 use super::along::Along;

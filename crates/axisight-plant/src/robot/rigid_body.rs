@@ -26,6 +26,37 @@ pub struct ShapeError {
     pub got: String,
 }
 
+/// Check the length of a vector, and that its entries are finite; `what` names them.
+#[inline(always)]
+pub(super) fn check_numbers(
+    field: &'static str,
+    x: &[f64],
+    n: usize,
+    what: &str,
+) -> Result<(), ShapeError> {
+    if x.len() == n && x.iter().all(|v| v.is_finite()) {
+        return Ok(());
+    }
+    Err(refused(field, x, n, what))
+}
+
+#[cold]
+fn refused(field: &'static str, x: &[f64], n: usize, what: &str) -> ShapeError {
+    let bad = x.iter().position(|v| !v.is_finite());
+    let (expected, got) = match bad.filter(|_| x.len() == n) {
+        None => (format!("{n} {what}"), x.len().to_string()),
+        Some(i) => {
+            let got = format!("{} at joint {}", x[i], i + 1);
+            ("finite values".to_owned(), got)
+        }
+    };
+    ShapeError {
+        field,
+        expected,
+        got,
+    }
+}
+
 impl RigidBody {
     /// The joints of a robot, without motors and springs.
     pub fn new(robot: &RobotDescription) -> Self {
@@ -44,22 +75,7 @@ impl RigidBody {
     }
 
     fn check(&self, field: &'static str, x: &[f64]) -> Result<(), ShapeError> {
-        let n = self.n_joints();
-        if x.len() != n {
-            return Err(ShapeError {
-                field,
-                expected: format!("{n} joint values"),
-                got: x.len().to_string(),
-            });
-        }
-        match x.iter().position(|v| !v.is_finite()) {
-            None => Ok(()),
-            Some(i) => Err(ShapeError {
-                field,
-                expected: "finite values".to_owned(),
-                got: format!("{} at joint {}", x[i], i + 1),
-            }),
-        }
+        check_numbers(field, x, self.n_joints(), "joint values")
     }
 
     fn evaluate(&self, q: &[f64], v: &[f64]) -> Result<DynamicsState<f64>, ShapeError> {

@@ -24,6 +24,7 @@ from axisight.gap.gate.start import check_start
 from axisight.logs import Log
 from axisight.robot import Robot
 from axisight.robot.branches import refuse_branches
+from axisight.robot.fixed_base import refuse_floating
 
 
 def pass_gate(
@@ -66,6 +67,7 @@ def check_by_targets(
     """
     check_names(despite)
     refuse_branches(robot, "the check of logs")
+    refuse_floating(robot, "the check of logs")
     logs = [*estimation, *validation]
     found = [f for f in check_machine(robot, logs) if f.name != "sample_time_differs"]
     found += _of_each(check_log_alone, logs)
@@ -100,6 +102,7 @@ def check_inputs(
     """
     check_names(despite)
     refuse_branches(robot, "the check of logs")
+    refuse_floating(robot, "the check of logs")
     found = flagged(_machine(robot, estimation, validation), despite)
     if refused(found):
         return tuple(found)

@@ -218,6 +218,7 @@ class _Compiled:
             bare=bare,
             of=body,
             follows=follows,
+            is_free=int(model.jnt_type[j]) == int(self.mujoco.mjtJoint.mjJNT_FREE),
         )
 
     def _friction_law(self, dof: int) -> tuple[float, float]:

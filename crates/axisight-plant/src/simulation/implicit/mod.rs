@@ -308,6 +308,7 @@ mod tests {
         RobotDescription {
             name: "falling".to_owned(),
             gravity: [0.0, 0.0, -9.81],
+            floating_base: None,
             sample_time: 0.02,
             joints: vec![
                 joint("driven", 2e6, Some(drive), 50.0),
