@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.errors import InputError, MissingExtraError
-from axisight.robot import Robot
+from axisight.robot import JointLimits, Robot
 from axisight.robot.description import Joint, Link
 from axisight.robot_export.dry_friction import joint_friction_nm
 
@@ -39,13 +39,21 @@ def mjcf(robot: Robot) -> str:
       times r and the drive. NAME has the stiffness and damping of the gear, and its angle is the joint angle
       minus the motor angle times r.
     - The inputs of the actuators are motor torques [Nm].
+    - Limits of position become the ``range`` of the joint that the motor drives, limits of effort its
+      ``actuatorfrcrange``. MuJoCo stops at both. An importer reads the second as a limit of the torque, too.
     - A massless link shares a body with the next link.
     - A floating base is a body ``base`` with a free joint.
 
-    MJCF has no place for the controller and all other effects, such as ripples and backlash. Raises InputError
+    MJCF has no place for the controller and all other effects, such as ripples and backlash. It has none for
+    limits of velocity and acceleration either: a comment says so if the robot states some. Raises InputError
     for a massless link with several joints on it, as a body of MuJoCo needs a mass.
     """
     root = ET.Element("mujoco", model=robot.name)
+    lost = [
+        x for x in ("velocity", "acceleration") if any(x in y.stated() for y in robot.joint_limits)
+    ]
+    if lost:
+        root.append(ET.Comment(f" No place in MJCF for the limits of {' and '.join(lost)}. "))
     ET.SubElement(root, "compiler", angle="radian", autolimits="false")
     ET.SubElement(
         root, "option", gravity=_text(robot.gravity_m_s2), timestep=repr(robot.sample_time_s)
@@ -64,6 +72,7 @@ def mjcf(robot: Robot) -> str:
 def _bodies(world: ET.Element, robot: Robot) -> None:
     """Append the bodies of a robot, each within the body that carries it; errors are those of `mjcf`."""
     friction = joint_friction_nm(robot)
+    limits = dict(zip(robot.axis_names, robot.joint_limits, strict=True))
     bodies: dict[int | None, ET.Element] = {None: _base(world, robot)}
     # Of joints with a massless link: the body that carries them, and the joints since that body.
     waiting: dict[int | None, tuple[ET.Element, list[Joint]]] = {}
@@ -82,7 +91,7 @@ def _bodies(world: ET.Element, robot: Robot) -> None:
         if joint.link is None:
             waiting[i] = carrier, joints
         else:
-            bodies[i] = _body(carrier, joints, friction)
+            bodies[i] = _body(carrier, joints, friction, limits)
 
 
 def _base(world: ET.Element, robot: Robot) -> ET.Element:
@@ -96,7 +105,12 @@ def _base(world: ET.Element, robot: Robot) -> ET.Element:
     return body
 
 
-def _body(parent: ET.Element, joints: Sequence[Joint], friction: dict[str, float]) -> ET.Element:
+def _body(
+    parent: ET.Element,
+    joints: Sequence[Joint],
+    friction: dict[str, float],
+    limits: dict[str, JointLimits],
+) -> ET.Element:
     """Append and return the body that these joints move; only the last joint has a link."""
     last = joints[-1]
     assert last.link is not None
@@ -105,7 +119,7 @@ def _body(parent: ET.Element, joints: Sequence[Joint], friction: dict[str, float
     place = -origin
     for joint in joints:
         place = place + joint.origin_m
-        _joint(body, joint, place, friction.get(joint.name, 0.0))
+        _joint(body, joint, place, friction.get(joint.name, 0.0), limits.get(joint.name))
     _inertial(body, last.link)
     return body
 
@@ -120,7 +134,9 @@ def _inertial(body: ET.Element, link: Link) -> None:
     )
 
 
-def _joint(body: ET.Element, joint: Joint, place: Array, friction: float) -> None:
+def _joint(
+    body: ET.Element, joint: Joint, place: Array, friction: float, limits: JointLimits | None
+) -> None:
     kind = {
         "type": "slide" if joint.prismatic else "hinge",
         "pos": _text(place),
@@ -134,6 +150,7 @@ def _joint(body: ET.Element, joint: Joint, place: Array, friction: float) -> Non
             "armature": repr(float(joint.drive.motor_inertia / ratio**2)),
             "damping": repr(float(joint.drive.viscous_friction / ratio**2)),
             "frictionloss": repr(float(friction)),
+            **({} if limits is None else _limited(limits)),
         }
     if joint.spring is not None:
         spring = {
@@ -144,6 +161,17 @@ def _joint(body: ET.Element, joint: Joint, place: Array, friction: float) -> Non
         ET.SubElement(body, "joint", {"name": MOTOR + joint.name, **kind, **drive})
         drive = {}
     ET.SubElement(body, "joint", {"name": joint.name, **kind, **drive, **spring})
+
+
+def _limited(limits: JointLimits) -> dict[str, str]:
+    """Return the attributes of a joint that state its limits."""
+    out: dict[str, str] = {}
+    if limits.position is not None:
+        out |= {"limited": "true", "range": _text(np.array(limits.position))}
+    if limits.effort is not None:
+        ends = np.array([-limits.effort, limits.effort])
+        out |= {"actuatorfrclimited": "true", "actuatorfrcrange": _text(ends)}
+    return out
 
 
 def _text(values: Array) -> str:

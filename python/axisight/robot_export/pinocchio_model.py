@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from axisight.errors import MissingExtraError
-from axisight.robot import Link, Robot
+from axisight.robot import JointLimits, Link, Robot
 from axisight.robot_export.dry_friction import joint_friction_nm
 
 
@@ -18,8 +18,9 @@ def to_pinocchio(robot: Robot) -> Any:
     Its ``rnea`` equals `Robot.inverse_dynamics`. A floating base is a ``JointModelFreeFlyer`` with the name
     ``root_joint``. Rotors are in ``rotorInertia`` [kg m^2, motor side] and
     ``rotorGearRatio`` (motor angle per joint angle). Viscous friction is in ``damping``, Coulomb friction in
-    the limits of dry friction, both joint-side. The model has no place for springs of gears and elastic
-    joints, the controller and all other effects. Raises MissingExtraError if Pinocchio is not installed.
+    the limits of dry friction, both joint-side. Position, velocity and effort have the limits of the robot,
+    infinite where it states none. The model has no place for limits of acceleration, springs of gears and
+    elastic joints, the controller and all other effects. Raises MissingExtraError if Pinocchio is not installed.
     """
     try:
         pinocchio = import_module("pinocchio")
@@ -29,6 +30,7 @@ def to_pinocchio(robot: Robot) -> Any:
     model.name = robot.name
     model.gravity.linear = robot.gravity_m_s2
     friction = joint_friction_nm(robot)
+    limits = dict(zip(robot.axis_names, robot.joint_limits, strict=True))
     base = 0  # Joint 0 of Pinocchio is the universe.
     if robot.floating_base is not None:
         flyer, still = pinocchio.JointModelFreeFlyer(), pinocchio.SE3.Identity()
@@ -52,6 +54,13 @@ def to_pinocchio(robot: Robot) -> Any:
             model.rotorInertia[v] = joint.drive.motor_inertia
             model.rotorGearRatio[v] = 1.0 / ratio
             model.damping[v] = joint.drive.viscous_friction / ratio**2
+        allowed = limits.get(joint.name, JointLimits())
+        low, high = allowed.position or (-np.inf, np.inf)
+        # These joints have one configuration for each speed.
+        q = model.joints[parent].idx_q
+        model.lowerPositionLimit[q], model.upperPositionLimit[q] = low, high
+        model.velocityLimit[v] = np.inf if allowed.velocity is None else allowed.velocity
+        model.effortLimit[v] = np.inf if allowed.effort is None else allowed.effort
         dry = friction.get(joint.name, 0.0)
         model.lowerDryFrictionLimit[v], model.upperDryFrictionLimit[v] = -dry, dry
     return model

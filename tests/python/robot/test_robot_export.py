@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -10,6 +11,7 @@ import pytest
 
 from axisight import Effect, load_robot, to_mujoco, to_pinocchio
 from axisight.errors import MissingExtraError
+from axisight.robot import JointLimits
 from axisight.robot_export import mjcf
 from axisight.robot_import import import_robot
 from import_data import URDF, written
@@ -102,10 +104,53 @@ def test_what_mujoco_is_given_comes_back(tmp_path: Path):
         if name.endswith(("motor_inertia", "viscous_friction")):
             assert back.parameters()[name] == pytest.approx(value, rel=1e-12)
     np.testing.assert_allclose(back.gear_ratio, robot.gear_ratio, rtol=1e-12)
-    assert [e.label for e in back.effects] == ["coulomb_friction@1"]
+    # The URDF limits the effort of the shoulder, and MuJoCo cuts torques at such a limit.
+    assert sorted(e.label for e in back.effects) == ["coulomb_friction@1", "torque_saturation@1"]
     friction = Effect("coulomb_friction", 2, {"coulomb_nm": 0.4, "smoothing_rad_s": 0.01})
     other = import_robot(written(tmp_path, mjcf(robot.with_effects([friction])), "other.xml"))
-    assert other.effects[0].values()[0] == pytest.approx(0.4)
+    found = {e.label: e.values()[0] for e in other.effects}
+    assert found["coulomb_friction@2"] == pytest.approx(0.4)
+
+
+def test_limits_come_back(tmp_path: Path):
+    """Import, export, import: each format returns the limits for which it has a place."""
+    first = load_robot(written(tmp_path, URDF))
+    shoulder, elbow = first.joint_limits
+    assert shoulder == JointLimits((-2.0, 2.0), velocity=3.0, effort=80.0)
+    assert elbow == JointLimits()
+    limits = [replace(shoulder, acceleration=9.0), JointLimits((-0.5, 1.0), effort=12.5)]
+    robot = first.with_joint_limits(limits)
+    assert import_robot(to_pinocchio(robot)).joint_limits == (shoulder, limits[1])
+    text = mjcf(robot)
+    back = import_robot(written(tmp_path, text, "arm.xml"))
+    assert back.joint_limits == (replace(shoulder, velocity=None), limits[1])
+    assert "No place in MJCF for the limits of velocity and acceleration." in text
+    assert "No place" not in mjcf(first.with_joint_limits([JointLimits(), limits[1]]))
+    again = import_robot(written(tmp_path, mjcf(back), "again.xml"))
+    assert again.joint_limits == back.joint_limits
+    assert [e.label for e in again.effects] == [e.label for e in back.effects]
+
+
+def test_an_elastic_gear_has_its_limits_on_the_motor():
+    robot = load_robot("two_mass_axis").with_joint_limits([JointLimits((-1.0, 2.0), effort=40.0)])
+    model = to_mujoco(robot)
+    (name,) = robot.axis_names
+    motor, arm = model.joint(f"motor of {name}"), model.joint(name)
+    assert list(motor.range) == [-1.0, 2.0]
+    assert list(model.jnt_actfrcrange[motor.id]) == [-40.0, 40.0]
+    assert model.jnt_limited[motor.id] == 1
+    assert model.jnt_actfrclimited[motor.id] == 1
+    assert model.jnt_limited[arm.id] == model.jnt_actfrclimited[arm.id] == 0
+
+
+def test_mujoco_stops_at_the_limit_of_effort():
+    """A constant torque beyond the limit acts as the limit does."""
+    robot = load_robot("two_mass_axis")
+    limited = to_mujoco(robot.with_joint_limits([JointLimits(effort=40.0)]))
+    data = mujoco.MjData(limited)
+    data.ctrl[:] = 2 * 40.0 * float(robot.gear_ratio[0])
+    mujoco.mj_forward(limited, data)
+    assert np.abs(data.qfrc_actuator).max() == pytest.approx(40.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("function", [to_mujoco, to_pinocchio])

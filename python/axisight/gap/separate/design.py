@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from axisight.fitting.divergence import must_hold
+from axisight.fitting.divergence import Diverged
 from axisight.gap.facts.experiment import Experiment, Plan
 from axisight.gap.fit.fitted_model import FittedModel, Hypothesis
 from axisight.gap.fit.model_fitter import ModelFitter
@@ -148,7 +148,7 @@ def _seen(
     *,
     alone: bool,
 ) -> dict[int, list[Seen]]:
-    """Return what each motion shows for each possible machine; zero for a motion that cannot be run.
+    """Return what each motion shows for each possible machine; zero for a motion that cannot be run or compared.
 
     ``alone``: evaluate each motion with the weights from its own torque.
     """
@@ -157,21 +157,44 @@ def _seen(
     out = {k: [nothing] * len(turns) for k in which}
     here = [k for k in which if all(r.possible[k] for r in runs)]
     together = [here] if here else []
-    for group in [[k] for k in here] if alone else together:
-        compared: dict[int, _Compared] = {}
-        # What a machine shows without the effects in question is the same for all rivals.
-        shown: dict[tuple[int, tuple[Hypothesis, ...]], Array] = {}
-        for place, (run, turn) in enumerate(zip(runs, turns, strict=True)):
-            machine = id(turn.machine)
-            if machine not in compared:
-                compared[machine] = _Compared(route.fitter(run, group, alone=alone), n_axes)
-            left, samples = compared[machine].left(turn.other, turn.free)
-            key = (machine, turn.neither)
-            if key not in shown:
-                same = turn.neither == turn.free
-                shown[key] = left if same else compared[machine].left(turn.other, turn.neither)[0]
-            for k, a, b, n in zip(group, left, shown[key], samples, strict=True):
-                out[k][place] = Seen(a, b, n)
+    groups = [[k] for k in here] if alone else together
+    while groups:
+        group = groups.pop()
+        found = _seen_along(route, question, runs, group, alone=alone)
+        if found is not None:
+            out |= found
+        elif len(group) > 1:
+            # A model diverges along one motion at least: halves find out along which.
+            groups += [group[: len(group) // 2], group[len(group) // 2 :]]
+    return out
+
+
+def _seen_along(
+    route: Route, question: Question, runs: Sequence[Runs], group: Sequence[int], *, alone: bool
+) -> dict[int, list[Seen]] | None:
+    """Return what each motion of a group shows for each possible machine; None if a model diverges along one."""
+    n_axes = route.view.robot.n_axes
+    out: dict[int, list[Seen]] = {k: [] for k in group}
+    compared: dict[int, _Compared] = {}
+    # What a machine shows without the effects in question is the same for all rivals.
+    shown: dict[tuple[int, tuple[Hypothesis, ...]], Array] = {}
+    for run, turn in zip(runs, question.turns, strict=True):
+        machine = id(turn.machine)
+        if machine not in compared:
+            compared[machine] = _Compared(route.fitter(run, group, alone=alone), n_axes)
+        found = compared[machine].left(turn.other, turn.free)
+        if found is None:
+            return None
+        left, samples = found
+        key = (machine, turn.neither)
+        if key not in shown:
+            same = turn.neither == turn.free
+            without = found if same else compared[machine].left(turn.other, turn.neither)
+            if without is None:
+                return None
+            shown[key] = without[0]
+        for k, a, b, n in zip(group, left, shown[key], samples, strict=True):
+            out[k].append(Seen(a, b, n))
     return out
 
 
@@ -186,22 +209,24 @@ class _Compared:
         self._fitter, self._n_axes = fitter, n_axes
         self._own: dict[tuple[str | None, str], Any] = {}
 
-    def left(self, model: FittedModel, free: Sequence[Hypothesis]) -> tuple[Array, list[float]]:
+    def left(
+        self, model: FittedModel, free: Sequence[Hypothesis]
+    ) -> tuple[Array, list[float]] | None:
         """Return what a model with the effects ``free`` leaves of each run, as mean squares (n_runs, n_axes).
 
-        The second value is the number of residuals of an axis in each run.
+        The second value is the number of residuals of an axis in each run. None if the model diverges along a run.
         """
         # Sensitivities along other logs cannot be reused.
         start = replace(model, columns=self._own)
-        found = must_hold(
-            self._fitter.fit(
-                free,
-                start,
-                robot_values=model.robot_values,
-                lazy=bool(self._own),
-                max_iterations=0,
-            )
+        found = self._fitter.fit(
+            free,
+            start,
+            robot_values=model.robot_values,
+            lazy=bool(self._own),
+            max_iterations=0,
         )
+        if isinstance(found, Diverged):
+            return None
         own = {
             key: column
             for key, column in found.columns.items()
