@@ -190,6 +190,7 @@ class EffectInfo(TypedDict):
     inverse_dynamics: bool
     beside: list[str]
     unrepeatable: bool
+    needs_chain: bool
     absorbed_by: list[str]
     shown_by: list[str]
     parameters: list[ParameterInfo]

@@ -79,6 +79,7 @@ fn describe<'py>(py: Python<'py>, info: &EffectInfo) -> PyResult<Bound<'py, PyDi
     out.set_item("inverse_dynamics", info.inverse_dynamics)?;
     out.set_item("beside", info.beside.to_vec())?;
     out.set_item("unrepeatable", info.unrepeatable)?;
+    out.set_item("needs_chain", info.needs_chain)?;
     out.set_item("absorbed_by", words(info.absorbed_by))?;
     out.set_item("shown_by", words(info.shown_by))?;
     let parameters: PyResult<Vec<_>> = info.parameters.iter().map(|p| parameter(py, p)).collect();

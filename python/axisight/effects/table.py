@@ -94,6 +94,7 @@ class EffectInfo:
     - ``inverse_dynamics``: whether torque predicted from measured motion can include the effect.
     - ``beside``: causes of the same axis without which predicted torque does not show the effect reliably.
     - ``unrepeatable``: no two runs repeat the effect; it is noise.
+    - ``needs_chain``: a robot with branches cannot have the effect, which acts at the one tip or the one next joint.
     - ``absorbed_by``: identified quantities that absorb the effect.
     - ``shown_by``: experiments that tell it from other effects, the best first.
     """
@@ -136,6 +137,7 @@ class EffectInfo:
     inverse_dynamics: bool
     beside: tuple[str, ...]
     unrepeatable: bool
+    needs_chain: bool
     absorbed_by: tuple[str, ...]
     shown_by: tuple[str, ...]
 

@@ -16,7 +16,6 @@ from axisight.rigid_body.from_logs import joint_motion
 from axisight.rigid_body.motion import MotionEstimate
 from axisight.rigid_body.regressor import TorqueModel
 from axisight.robot import Robot
-from axisight.robot.branches import refuse_branches
 from axisight.robot.fixed_base import refuse_floating
 
 Array = NDArray[np.float64]
@@ -133,7 +132,6 @@ def _of_robot(motions: RunMotions, robot: Robot) -> Columns:
     n_runs, n, n_axes = motions.torque.shape
     if robot.n_axes != n_axes:
         raise InputError(f"robot: expected {n_axes} axes as the logs, got {robot.n_axes}")
-    refuse_branches(robot, "the comparison of runs")
     refuse_floating(robot, "the comparison of runs")
     model = TorqueModel(robot, terms=USUAL_TERMS, side="motor")
     joint = [joint_motion(model, motion) for motion in motions.runs]

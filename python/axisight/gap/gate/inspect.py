@@ -23,7 +23,6 @@ from axisight.gap.gate.silent_torques import set_aside, silent_axes, without_sil
 from axisight.gap.gate.start import check_start
 from axisight.logs import Log
 from axisight.robot import Robot
-from axisight.robot.branches import refuse_branches
 from axisight.robot.fixed_base import refuse_floating
 
 
@@ -63,10 +62,9 @@ def check_by_targets(
     """Return all faults of logs with commands in place of torque that show without a fit.
 
     ``despite`` as in :func:`check_inputs`. Raises InputError for a name that is no fault, or for a fault that
-    rules out any diagnosis, and RobotError for a robot with branches.
+    rules out any diagnosis, and RobotError for a floating base.
     """
     check_names(despite)
-    refuse_branches(robot, "the check of logs")
     refuse_floating(robot, "the check of logs")
     logs = [*estimation, *validation]
     found = [f for f in check_machine(robot, logs) if f.name != "sample_time_differs"]
@@ -97,11 +95,9 @@ def check_inputs(
     Axes whose torque carries nothing are set aside: later stages do not look at them. Logs that the second stage
     refuses are left out of the later ones, so that all faults of a data set show in one run. Any other refusal ends
     the checks, since later stages rest on it. ``despite``: names of faults that are only flagged. Raises InputError
-    for a name that is no fault, or for a fault that rules out any diagnosis, and RobotError for a robot with
-    branches.
+    for a name that is no fault, or for a fault that rules out any diagnosis, and RobotError for a floating base.
     """
     check_names(despite)
-    refuse_branches(robot, "the check of logs")
     refuse_floating(robot, "the check of logs")
     found = flagged(_machine(robot, estimation, validation), despite)
     if refused(found):

@@ -18,6 +18,7 @@ from axisight.gap.hypotheses.start_context import Place, Response, StartContext,
 from axisight.gap.hypotheses.start_values import STARTS, TARGET_STARTS
 from axisight.logs import Log
 from axisight.robot import Robot
+from axisight.robot.branches import neighbouring_axes
 
 Array = NDArray[np.float64]
 
@@ -146,10 +147,12 @@ def _in_torque(info: EffectInfo) -> bool:
 
 def _places(robot: Robot, info: EffectInfo) -> list[Place]:
     """Return the axes (from 1) or pairs of neighbouring axes on which an effect can act; (None,) for the whole arm."""
+    if info.needs_chain and not robot.is_chain:
+        return []
     if info.scope == "arm":
         return [None]
     if info.scope == "axes":
-        return [(axis, axis + 1) for axis in robot.axis_numbers()[:-1]]
+        return list(neighbouring_axes(robot))
     rigid = robot.axis_is_rigid
     return [
         axis

@@ -89,9 +89,12 @@ def _with_load(route: Route, model: FittedModel, rich: Motion) -> tuple[Load | N
     """Return a load that shows along the rich motion within the limits, and the motion to run with it.
 
     Its centre is that of the last link: a load on a joint's axis would not turn the joint.
-    The largest of several masses that the motors can carry along the motion, or along a smaller one.
+    The largest of several masses that the motors can carry along the motion, or along a smaller one. A robot with
+    branches has no one tip for a load.
     """
     robot = route.view.robot
+    if not robot.is_chain:
+        return None, rich
     links = [j.link for j in robot.joints if j.link is not None]
     whole = sum(link.mass_kg for link in links)
     x, y, z = (float(c) for c in links[-1].com_m)

@@ -14,7 +14,6 @@ from axisight.effects import Effect, effect_info
 from axisight.fitting import robot_parameters
 from axisight.gap.facts.settings import Settings
 from axisight.robot import Robot, load_robot
-from axisight.robot.branches import refuse_branches
 from axisight.robot.fixed_base import refuse_floating
 from axisight.robot_file import load_identified
 from axisight.robot_file.sidecar import sidecar_path
@@ -57,14 +56,12 @@ def loaded(
 ) -> tuple[Robot, Settings]:
     """Return the simulator, and settings with the tolerances in and beside its file.
 
-    ``sample_time_s``: for a model file that states none. Raises RobotError for a robot with branches.
+    ``sample_time_s``: for a model file that states none. Raises RobotError for a floating base.
     """
     if isinstance(source, Robot):
-        refuse_branches(source, "the diagnosis")
         refuse_floating(source, "the diagnosis")
         return source, settings
     machine = load_robot(source, sample_time_s=sample_time_s)
-    refuse_branches(machine, "the diagnosis")
     refuse_floating(machine, "the diagnosis")
     if settings.tolerances is not None:
         return machine, settings

@@ -51,7 +51,7 @@ def validated(
     lost: dict[int, str] = {}
     while True:
         concluded = conclude(found, settings=settings, stands_out=clear, shown=view.shown)
-        conclusion = open_with_constants(concluded, unknown_constants)
+        conclusion = open_with_constants(concluded, unknown_constants, view.robot)
         causes = with_own_scatter(conclusion.causes, view.fitter.tolerated)
         conclusion = replace(conclusion, causes=causes)
         reach = reach_of(view, held_logs, found, conclusion.effects, settings)

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from axisight.effects import Effect
-from axisight.effects.stated import LOAD
+from axisight.effects.stated import LINK_COM, LINK_MASS, LOAD
 from axisight.gap.gate.by_dynamics.torque_fit import nuisance
 from axisight.gap.gate.by_dynamics.undone_mistakes import predict
 from axisight.gap.signals.motion import Motion
 from axisight.robot import Robot
+from axisight.robot.branches import tips
 
 Array = NDArray[np.float64]
 
@@ -19,7 +20,7 @@ _PLACES = ((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1))
 
 
 def load_or_rotor_explains(robot: Robot, at: Motion, axis: int) -> bool:
-    """Whether a load on the last link and a rotor explain the torque of an axis (from 0) as well as a factor does.
+    """Whether loads on the last links and a rotor explain the torque of an axis (from 0) as well as a factor does.
 
     Both with friction and an offset, fitted to one half of the log and judged on the other.
     """
@@ -33,17 +34,30 @@ def load_or_rotor_explains(robot: Robot, at: Motion, axis: int) -> bool:
 
 
 def load_torques(robot: Robot, at: Motion, bodies: Array) -> list[Array]:
-    """Return the torques (n, n_axes) [Nm] of unit masses on the last link, beside those of the ``bodies``.
+    """Return the torques (n, n_axes) [Nm] of masses on the last link of each branch, beside those of the ``bodies``.
 
     Their sums are, to first order, the torques of all loads.
     """
-    return [predict(_loaded(robot, place), at) - bodies for place in _PLACES]
+    loaded = (robot.with_effects([*robot.effects, load]) for load in _loads(robot))
+    return [predict(one, at) - bodies for one in loaded]
 
 
-def _loaded(robot: Robot, place: tuple[float, float, float]) -> Robot:
-    x, y, z = place
-    load = Effect(LOAD, None, {"mass_kg": 1.0, "x_m": x, "y_m": y, "z_m": z})
-    return robot.with_effects([*robot.effects, load])
+def _loads(robot: Robot) -> list[Effect]:
+    """Return effects that add masses on the last links: at places of a chain, else by mass and centre of each tip."""
+    if robot.is_chain:
+        masses = [dict(zip(("x_m", "y_m", "z_m"), place, strict=True)) for place in _PLACES]
+        return [Effect(LOAD, None, {"mass_kg": 1.0, **at}) for at in masses]
+    moved = [
+        dict.fromkeys(("x_m", "y_m", "z_m"), 0.0) | {name: 0.1} for name in ("x_m", "y_m", "z_m")
+    ]
+    return [
+        one
+        for axis in tips(robot)
+        for one in (
+            Effect(LINK_MASS, axis, {"relative_change": 1.0}),
+            *(Effect(LINK_COM, axis, shift) for shift in moved),
+        )
+    ]
 
 
 def _left(torque: Array, columns: Array) -> float:
