@@ -172,7 +172,7 @@ def compare_command(
 
 
 def _methods(given: list[str]) -> dict[str, Path]:
-    """Return the folders or files of ``--entries`` by method; raise InputError for other text and for a repeated name."""
+    """Return folder or file of ``--entries`` by method; raise InputError for other text and for a repeated name."""
     found: dict[str, Path] = {}
     for text in given:
         name, equals, path = text.partition("=")

@@ -76,12 +76,8 @@ def guess_command(
             typer.echo(found.text, nl=False)
             return
         write_whole(out, found.text)
-        chain = [
-            word
-            for name in ("base", "tip")
-            if (link := getattr(options, name))
-            for word in (f"--{name}", link)
-        ]
+        links = [("base", base), *(("tip", link) for link in options.tips)]
+        chain = [word for name, link in links if link for word in (f"--{name}", link)]
         _say_found(out, log, [] if robot is None else ["--robot", robot, *chain], found)
 
 

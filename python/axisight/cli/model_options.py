@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -23,11 +24,11 @@ Base = Annotated[
     ),
 ]
 Tip = Annotated[
-    str | None,
+    list[str] | None,
     typer.Option(
         rich_help_panel=SIMULATOR,
-        help="Last link of the chain of a model file; other branches are locked at zero. Default: the end "
-        "of the only moving branch.",
+        help="Last link of a branch of a model file (repeatable); other branches are locked at zero. Default: the "
+        "end of the only moving branch.",
     ),
 ]
 Load = Annotated[
@@ -46,19 +47,26 @@ class ModelOptions:
     """Options ``--base``, ``--tip`` and ``--payload`` as they were given."""
 
     base: str | None = None
-    tip: str | None = None
+    tip: str | Sequence[str] | None = None
     payload: str | None = None
+
+    @property
+    def tips(self) -> tuple[str, ...]:
+        """The last links of the branches to take; empty if none was given."""
+        return (self.tip,) if isinstance(self.tip, str) else tuple(self.tip or ())
 
     def given(self) -> list[str]:
         """Return the options that were given."""
-        return [f"--{name}" for name, text in vars(self).items() if text is not None]
+        return [f"--{name}" for name, value in vars(self).items() if value]
 
     def drives(self, source: Path | str, file: Path | None = None) -> DriveData:
         """Return the drive data of a model, from ``file`` or beside the model, updated by the given options.
 
         Raises InputError for a payload that is not KG or KG,X,Y,Z.
         """
-        said: dict[str, object] = {"base": self.base, "tip": self.tip}
+        said: dict[str, object] = {"base": self.base}
+        if self.tips:
+            said["tip"] = self.tips[0] if len(self.tips) == 1 else list(self.tips)
         if self.payload is not None:
             said["payload"] = _payload(self.payload)
         stated = {name: value for name, value in said.items() if value is not None}

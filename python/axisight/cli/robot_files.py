@@ -63,8 +63,8 @@ def import_command(
         out = None if is_output(out) else out
         given = [model, *(x for x in (drives,) if x)]
         check_targets({"-o": out}, inputs=given, replaces={"-o": ()}, force=force)
-        if whole_tree and tip is not None:
-            raise InputError(f"--whole-tree: expected no --tip beside it, got --tip {tip}")
+        if whole_tree and tip:
+            raise InputError(f"--whole-tree: expected no --tip beside it, got --tip {tip[0]}")
         data = ModelOptions(base, tip, payload).drives(model, drives)
         robot = import_robot(model, drives=data, whole_tree=whole_tree, floating=floating)
         if out is None:

@@ -11,7 +11,6 @@ import pinocchio_model
 from axisight import Effect, Robot
 from axisight.calibration import nominal_geometry
 from axisight.errors import InputError, RobotError
-from axisight.gap import check_inputs
 from axisight.paths import tool_path
 from axisight.rigid_body import TorqueModel, base_parameters
 from axisight.robot_export import to_mujoco, to_pinocchio
@@ -223,5 +222,3 @@ def test_what_needs_one_chain_refuses_branches():
         nominal_geometry(robot)
     with pytest.raises(RobotError, match=f"a path of the tool {named}"):
         tool_path(robot, [[0.1, 0.2, 0.3]], start_rad=[0.0, 0.0, 0.0])
-    with pytest.raises(RobotError, match=f"the check of logs {named}"):
-        check_inputs(robot, [], [])

@@ -8,8 +8,10 @@ import mujoco
 import numpy as np
 import pinocchio
 import pytest
+from typer.testing import CliRunner
 
-from axisight import Robot, diagnose, load_robot
+from axisight import Robot, load_robot
+from axisight.cli import app
 from axisight.errors import RobotError
 from axisight.robot_import import import_robot
 from import_data import changed, written
@@ -120,14 +122,13 @@ def test_a_payload_needs_one_last_link(tmp_path: Path):
         import_robot(path)
 
 
-def test_a_diagnosis_refuses_branches_by_name(tmp_path: Path):
-    robot = import_robot(written(tmp_path, TWO_ARMS), whole_tree=True)
-    table = {"time": np.arange(2000) * 1e-3}
-    for k in range(1, 7):
-        table[f"position_{k}"] = np.sin(table["time"])
-        table[f"torque_{k}"] = np.cos(table["time"])
-    again = Robot.from_toml(robot.toml)
-    with pytest.raises(
-        RobotError, match="the diagnosis needs, got branches: right_shoulder is on waist"
-    ):
-        diagnose(again, [table, table])
+def test_the_command_line_takes_several_tips(tmp_path: Path):
+    path, out = written(tmp_path, TWO_ARMS), tmp_path / "arms.toml"
+    tips = ["--tip", "left_palm", "--tip", "right_lower"]
+    done = CliRunner().invoke(app, ["robot", "import", str(path), "-o", str(out), *tips])
+    assert done.exit_code == 0, done.output
+    assert load_robot(out).toml == import_robot(path, tip=["left_palm", "right_lower"]).toml
+    one = CliRunner().invoke(app, ["robot", "import", str(path), "--tip", "left_palm"])
+    assert Robot.from_toml(one.output).is_chain
+    both = CliRunner().invoke(app, ["robot", "import", str(path), "--whole-tree", *tips[:2]])
+    assert both.exit_code == 2 and "no --tip beside it, got --tip left_palm" in both.output
