@@ -203,9 +203,9 @@ def refined(
     return cost, c
 
 
-def estimated(model: Model, u: Array) -> Array:
-    """Return the positions (n, 6) most probable given the torques of a whole recording; not causal."""
-    out = []
+def estimated(model: Model, u: Array) -> tuple[Array, list[float]]:
+    """Return the most probable positions (n, 6) given all torques, not causal, and the cost of each motion."""
+    out, costs = [], []
     for at in model.plan.stretches:
         part, estimator = u[at], model.estimator(at)
         found = []
@@ -222,17 +222,20 @@ def estimated(model: Model, u: Array) -> Array:
                 if value < cost:
                     cost, best = value, trial
         out.append(estimator.position(best))
-    return np.concatenate(out)
+        costs.append(cost)
+    return np.concatenate(out), costs
 
 
-def from_the_truth(model: Model, record: Recording) -> Array:
-    """Return the nearest optimum to the measured motion: a bound, which a prediction cannot use."""
-    out = []
+def from_the_truth(model: Model, record: Recording) -> tuple[Array, list[float]]:
+    """Return the optimum nearest the measured motion, which a prediction cannot use, and its costs."""
+    out, costs = [], []
     for at in model.plan.stretches:
         estimator = model.estimator(at)
         c = estimator.coefficients(record.position_rad[at])
-        out.append(estimator.position(refined(estimator, record.torque_nm[at], c, FINE[1:])[1]))
-    return np.concatenate(out)
+        cost, c = refined(estimator, record.torque_nm[at], c, FINE[1:])
+        out.append(estimator.position(c))
+        costs.append(cost)
+    return np.concatenate(out), costs
 
 
 def nrmse(position: Array, record: Recording) -> Array:
@@ -269,13 +272,15 @@ def report(model: Model, name: str, record: Recording) -> Array:
         print(row(label, "yes", position, record), flush=True)
     rough = np.concatenate([model.starts[0](u[at])[0] for at in model.plan.stretches])
     print(row("regression alone (start)", "no", rough, record), flush=True)
-    ours = estimated(model, u)
+    ours, found = estimated(model, u)
     print(row("most probable motion", "no", ours, record), flush=True)
-    bound = from_the_truth(model, record)
+    bound, nearest = from_the_truth(model, record)
     print(
         row("optimum nearest the measured motion (not a prediction)", "no", bound, record),
         flush=True,
     )
+    for label, costs in (("found", found), ("nearest the measured motion", nearest)):
+        print(f"cost of the optimum {label}: " + ", ".join(f"{x:.0f}" for x in costs))
     left = torque_errors(model.physics, [record], model.plan.used, model.step_s)
     share = left[0] / u[model.plan.used].std(axis=0)
     print(
