@@ -101,7 +101,7 @@ EFFECTS: dict[str, tuple[str, Change]] = {
     "viscous": ("viscous_friction", _field("dof_damping", lambda a: 0.2 * a.torque / a.speed)),
     "link mass": ("link_mass", _mass),
     "centre of mass": ("link_com", _com),
-    "rotor": ("motor_inertia", _field("dof_armature", lambda a: 0.3 * a.torque / a.acceleration)),
+    "rotor": ("rotor_inertia", _field("dof_armature", lambda a: 0.3 * a.torque / a.acceleration)),
     "torque constant": ("torque_constant", _gain),
     "offset": ("torque_offset", lambda _m, _j, a: lambda _q, _v: 0.2 * a.torque),
     "spring": ("cable_stiffness", _spring),
