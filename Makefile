@@ -91,6 +91,7 @@ docs: $(STAMPS)/docs-tools
 	$(BIN)/python docs/make_mujoco_homes.py
 	$(BIN)/python docs/make_verdict.py
 	$(BIN)/python docs/make_constants.py
+	$(BIN)/python docs/make_twenty_robots.py
 	$(BIN)/python docs/make_cli.py
 	$(BIN)/python docs/make_gallery.py --page-only
 	$(BIN)/python docs/make_plots.py --page-only

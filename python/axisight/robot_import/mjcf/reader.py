@@ -27,6 +27,7 @@ from axisight.robot_import.bodies import (
 from axisight.robot_import.mjcf.actuators import Actuators, numbers
 from axisight.robot_import.mjcf.gravity import Compensation, compensation
 from axisight.robot_import.mjcf.joint_limits import limits_of_joint
+from axisight.robot_import.mjcf.loops import closes_a_loop, joints_in_loops
 from axisight.robot_import.mjcf.notes import notes_of
 from axisight.robot_import.mjcf.sensors import reading_delay_s
 from axisight.robot_import.outside import with_includes
@@ -98,6 +99,8 @@ class _Compiled:
             if model.eq_obj2id[i] >= 0
         }
 
+        self.loops = joints_in_loops(self.mujoco, model)
+
     def tree(self) -> Tree:
         """Return the bodies, parents first; every joint is a body of its own."""
         model = self.model
@@ -168,6 +171,8 @@ class _Compiled:
         motion = self.motions.get(int(model.jnt_type[j]), "other")
         follows = self._name("joint", self.masters[j]) if j in self.masters else ""
         refused = mimics(follows) if follows else ""
+        if j in self.loops:
+            refused = closes_a_loop(self._name("equality", self.loops[j]))
         if motion == "other":
             refused = (
                 "expected hinge and slide joints between base and tip, got a ball or free joint: choose "
