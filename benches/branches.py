@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -114,8 +115,11 @@ EFFECTS: dict[str, tuple[str, Change]] = {
 
 
 def bare(path: Path) -> str:
-    """Return a URDF without shapes, for MuJoCo: fixed joints are merged, and each moving joint has a motor."""
+    """Return a URDF without shapes and friction, so that MuJoCo needs no mesh and each effect is the only one."""
     root = ElementTree.parse(path).getroot()
+    for joint in root.iter("joint"):
+        for stated in joint.findall("dynamics"):
+            joint.remove(stated)
     for link in root.iter("link"):
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(shape)
@@ -140,8 +144,6 @@ def machine_of(text: str, names: Sequence[str]) -> mujoco.MjModel:
             spec.delete(joint)
             continue
         joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE
-        joint.damping, joint.frictionloss = np.zeros_like(joint.damping), 0.0
-        joint.armature = 0.0
     for name in names:
         spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     spec.option.timestep, spec.option.integrator = STEP_S, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -164,11 +166,13 @@ class Body:
     size: Array
 
     @classmethod
-    def of(cls, path: Path, tips: list[str]) -> Body:
-        """Read a URDF; all branches move, or those that end at ``tips``."""
+    def of(cls, source: Path, tips: list[str], folder: Path) -> Body:
+        """Read a URDF, of which ``folder`` gets a bare copy; all branches move, or those that end at ``tips``."""
+        path = folder / source.name
+        path.write_text(bare(source))
         robot = simulator(path, tips, STEP_S * PER_SAMPLE)
         names = tuple(robot.axis_names)
-        text = bare(path)
+        text = path.read_text()
         spec = mujoco.MjSpec.from_string(text)
         ranges = np.array([next(j for j in spec.joints if j.name == name).range for name in names])
         ranges[ranges[:, 0] >= ranges[:, 1]] = -1.0, 1.0
@@ -321,11 +325,12 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     given = parser.parse_args()
     rows: list[dict[str, object]] = []
+    folder = Path(tempfile.mkdtemp())
     for number, name in enumerate(ROBOTS):
         if name not in given.robots:
             continue
         file, tips = ROBOTS[name]
-        body = Body.of(next(given.folder.rglob(file)), tips)
+        body = Body.of(next(given.folder.rglob(file)), tips, folder)
         print(f"{name}: {len(body.names)} axes", flush=True)
         for k, effect in enumerate(EFFECTS):
             if effect in given.effects:

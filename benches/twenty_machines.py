@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,8 +30,8 @@ TORQUE_NOISE, POSITION_NOISE = 0.01, 1e-5
 # Shares of the standard deviation of the torque of an axis that a withheld effect takes.
 SHARE = 0.4
 _SHAPES = {"urdf": ("visual", "collision"), "xml": ("geom", "mesh", "texture", "material", "light")}
-# The friction of a URDF is dry. As a constraint this stiff, MuJoCo's hardly creeps (solref, solimp).
-_DRY = (2 * STEP_S, 1.0), (0.999, 0.999, 0.001, 0.5, 2.0)
+# Corner of dry friction x / hypot(x, corner) [rad/s, m/s].
+CORNER = 0.01
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _EXTRAS = ("sensor", "keyframe", "contact", "visual", "asset")
 
@@ -96,8 +97,8 @@ class Arm:
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
         self.model = spec.compile()
-        if path.suffix == ".urdf":
-            self.model.dof_solref[:], self.model.dof_solimp[:] = _DRY
+        self.dry = self.model.dof_frictionloss.copy()
+        self.model.dof_frictionloss[:] = 0.0
         found = [self.model.joint(j).name for j in range(self.model.njnt)]
         if sorted(found) != sorted(joints):
             raise ValueError(f"{path}: joints: expected {list(joints)}, got {found}")
@@ -120,6 +121,14 @@ class Arm:
             data.qfrc_applied[self.order] += torque
         else:
             data.ctrl[self.motors] = torque
+
+    def rub(self, model: mujoco.MjModel, speed: Array) -> None:
+        """Give a copy of the model the dry friction at the speeds of all joints, as damping.
+
+        MuJoCo's own dry friction is a soft constraint: it acts ahead of the speed and creeps at rest. Damping is
+        integrated implicitly, so that light joints with much friction are stable.
+        """
+        model.dof_damping[:] = self.model.dof_damping + self.dry / np.hypot(speed, CORNER)
 
     def middle_and_reach(self) -> tuple[Array, Array]:
         """Return the middle and half the travel of a motion of each joint [rad, m], within its range."""
@@ -202,10 +211,10 @@ class Machine:
     def torque(self, axis_q: float, axis_v: float) -> float:
         """Return the torque beside the motor of the axis [Nm]."""
         if self.effect == "coulomb_friction":
-            return -self.size * axis_v / float(np.hypot(axis_v, 0.01))
+            return -self.size * axis_v / float(np.hypot(axis_v, CORNER))
         if self.effect == "stribeck_friction":
             level = 0.5 + 0.5 / (1.0 + (axis_v / 0.15) ** 2)
-            return -self.size * level * axis_v / float(np.hypot(axis_v, 0.01))
+            return -self.size * level * axis_v / float(np.hypot(axis_v, CORNER))
         if self.effect == "torque_ripple":
             return self.size * float(np.sin(12.0 * axis_q + 0.7))
         if self.effect == "torque_offset":
@@ -227,7 +236,8 @@ NOTHING = Machine("none", 0, 0.0)
 def run(arm: Arm, nominal: Arm, run_: int, machine: Machine = NOTHING) -> tuple[Array, Array]:
     """Return measured positions and commanded torques (n, n_axes) of an arm along the references of a run."""
     reference = Reference(*nominal.middle_and_reach(), run_)
-    data, known = mujoco.MjData(arm.model), mujoco.MjData(nominal.model)
+    model = copy(arm.model)
+    data, known = mujoco.MjData(model), mujoco.MjData(nominal.model)
     where, there, axis = arm.order, nominal.order, machine.axis
     zero, gain = np.zeros(len(where)), np.ones(len(where))
     zero[axis], gain[axis] = machine.zero(), machine.gain()
@@ -250,7 +260,8 @@ def run(arm: Arm, nominal: Arm, run_: int, machine: Machine = NOTHING) -> tuple[
             positions.append(q)
             torques.append(torque)
         arm.push(data, torque, beside)
-        mujoco.mj_step(arm.model, data)
+        arm.rub(model, data.qvel)
+        mujoco.mj_step(model, data)
     return np.array(positions), np.array(torques)
 
 
