@@ -239,6 +239,7 @@ def outcome(
     model = f"model.{entry.format}"
     row: dict[str, Any] = {"name": entry.name, "kind": entry.kind, "model": model, "commands": []}
     without_shapes(checkouts / entry.repository / entry.path, folder / model)
+    (folder / f"patched.{entry.format}").unlink(missing_ok=True)
     text = (folder / model).read_text()
     (folder / model).write_text(text.replace(*entry.mended) if entry.mended[0] else text)
     ends = entry.ends(whole_tree=whole)
