@@ -125,13 +125,25 @@ def bare(path: Path) -> str:
             link.remove(shape)
     for other in [child for child in root if child.tag not in ("link", "joint")]:
         root.remove(other)
+    for inertia in root.iter("inertia"):
+        _balance(inertia)
     root.insert(
         0,
-        ElementTree.fromstring(
-            '<mujoco><compiler fusestatic="true" balanceinertia="true"/></mujoco>'
-        ),
+        ElementTree.fromstring('<mujoco><compiler fusestatic="true"/></mujoco>'),
     )
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def _balance(inertia: ElementTree.Element) -> None:
+    """Make an inertia that no body can have, which MuJoCo refuses, that of a ball of the same trace."""
+    moments = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    xx, xy, xz, yy, yz, zz = (float(inertia.get(key, 0.0)) for key in moments)
+    least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if least > 0.0 and least + middle >= most:
+        return
+    ball = (xx + yy + zz) / 3
+    for key in moments:
+        inertia.set(key, repr(ball) if key[1] == key[2] else "0")
 
 
 def machine_of(text: str, names: Sequence[str]) -> mujoco.MjModel:

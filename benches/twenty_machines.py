@@ -21,7 +21,7 @@ from axisight.logs import lowpass
 
 Array = NDArray[np.float64]
 
-STEP_S, PER_SAMPLE, DURATION_S = 0.002, 5, 8.0
+STEP_S, PER_SAMPLE, DURATION_S = 0.0005, 20, 8.0
 RUNS = 3
 # Closed loop of the controller: two poles at this rate [rad/s].
 _POLE = 20.0
@@ -122,13 +122,16 @@ class Arm:
         else:
             data.ctrl[self.motors] = torque
 
-    def rub(self, model: mujoco.MjModel, speed: Array) -> None:
-        """Give a copy of the model the dry friction at the speeds of all joints, as damping.
+    def rub(self, model: mujoco.MjModel, speed: Array) -> Array:
+        """Give a copy of the model half of its friction as damping; return the other half as torques [Nm], (nv,).
 
-        MuJoCo's own dry friction is a soft constraint: it acts ahead of the speed and creeps at rest. Damping is
-        integrated implicitly, so that light joints with much friction are stable.
+        MuJoCo's own dry friction is a soft constraint: it acts ahead of the speed and creeps at rest. Its damping acts
+        at the speed after the step, which looks like a rotor of half the step times the damping. Half of both before
+        and half after the step is the midpoint rule: it has no such rotor, and light joints stay stable.
         """
-        model.dof_damping[:] = self.model.dof_damping + self.dry / np.hypot(speed, CORNER)
+        half = 0.5 * (self.model.dof_damping + self.dry / np.hypot(speed, CORNER))
+        model.dof_damping[:] = half
+        return np.asarray(-half * speed)
 
     def middle_and_reach(self) -> tuple[Array, Array]:
         """Return the middle and half the travel of a motion of each joint [rad, m], within its range."""
@@ -259,8 +262,7 @@ def run(arm: Arm, nominal: Arm, run_: int, machine: Machine = NOTHING) -> tuple[
         if k % PER_SAMPLE == 0:
             positions.append(q)
             torques.append(torque)
-        arm.push(data, torque, beside)
-        arm.rub(model, data.qvel)
+        arm.push(data, torque, beside + arm.rub(model, data.qvel)[where])
         mujoco.mj_step(model, data)
     return np.array(positions), np.array(torques)
 

@@ -64,7 +64,7 @@ def test_a_nominal_arm_follows_its_reference(
     reference = machines.Reference(*arm.middle_and_reach(), 1)
     times = machines.STEP_S * machines.PER_SAMPLE * np.arange(len(position))
     wanted = np.array([reference(t)[0] for t in times])
-    # The loop is exact but for the order one of the integrator: a step of 2 ms at 5 rad/s^2 and poles at 20 rad/s.
+    # The loop is exact but for the order one of the integrator: a step of 0.5 ms at 5 rad/s^2 and poles at 20 rad/s.
     assert np.abs(position - wanted).max() < 5e-3
 
 
