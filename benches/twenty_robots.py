@@ -19,6 +19,7 @@ import subprocess
 import sys
 import time
 import tomllib
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -221,11 +222,13 @@ def by_inverse_dynamics(folder: Path, log: str, row: dict[str, Any]) -> list[flo
     gaps = []
     for name in (row["model"], row["patched"]):
         arm = Arm(folder / name, row["joints"])
-        data, asked = mujoco.MjData(arm.model), np.empty_like(q)
+        model = copy(arm.model)
+        data, asked = mujoco.MjData(model), np.empty_like(q)
         for k in range(len(q)):
             data.qpos[arm.order], data.qvel[arm.order], data.qacc[arm.order] = q[k], v[k], a[k]
-            mujoco.mj_inverse(arm.model, data)
-            asked[k] = data.qfrc_inverse[arm.order]
+            beside = arm.rub(model, data.qvel)
+            mujoco.mj_inverse(model, data)
+            asked[k] = (data.qfrc_inverse - beside)[arm.order]
         gaps.append(gap(asked, read.torque_nm, dt, cutoff_hz))
     return gaps
 

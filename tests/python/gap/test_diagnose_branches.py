@@ -1,6 +1,7 @@
 """Diagnoses of a robot with two arms, by inverse dynamics."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,11 +49,13 @@ def two_arms() -> Robot:
     )
 
 
-def log_of(robot: Robot, run: int, *, dry_nm: float = 0.0, heavier: float = 1.0) -> Log:
-    """Return a log of motors with dry friction on the right shoulder and a heavier lower link of the left arm."""
+def log_of(
+    robot: Robot, run: int, *, dry_nm: float = 0.0, heavier: float = 1.0, link: str = "left_lower"
+) -> Log:
+    """Return a log of motors with dry friction on axis 4 and a heavier ``link``."""
     t = STEP_S * np.arange(round(SECONDS / STEP_S))
-    axis = np.arange(5)
-    q, v, a = np.zeros((3, len(t), 5))
+    axis = np.arange(robot.n_axes)
+    q, v, a = np.zeros((3, len(t), robot.n_axes))
     for size, rate in ((0.4, 1.1 + 0.2 * run), (0.2, 2.7 + 0.3 * run)):
         w = rate * (1 + 0.07 * axis)
         at = w * t[:, None] + 1.3 * axis + run
@@ -61,10 +64,11 @@ def log_of(robot: Robot, run: int, *, dry_nm: float = 0.0, heavier: float = 1.0)
             v + size * w * np.cos(at),
             a - size * w**2 * np.sin(at),
         )
-    mass = {"left_lower.mass": 2.0 * heavier}
-    machine = robot.with_parameters(mass)
+    name = f"{link}.mass"
+    machine = robot.with_parameters({name: robot.parameters()[name] * heavier})
     motor = RATIO * machine.inverse_dynamics(q, v, a) + (ROTOR * a + VISCOUS * v) / RATIO
-    motor[:, RIGHT_UPPER] += dry_nm * np.tanh(v[:, RIGHT_UPPER] / RATIO / 0.5)
+    if dry_nm:
+        motor[:, RIGHT_UPPER] += dry_nm * np.tanh(v[:, RIGHT_UPPER] / RATIO / 0.5)
     random = np.random.default_rng(run)
     return Log(
         name=f"run{run}",
@@ -76,7 +80,7 @@ def log_of(robot: Robot, run: int, *, dry_nm: float = 0.0, heavier: float = 1.0)
     )
 
 
-def diagnosed(robot: Robot, **of: float) -> Diagnosis:
+def diagnosed(robot: Robot, **of: Any) -> Diagnosis:
     logs = [log_of(robot, run, **of) for run in range(3)]
     return diagnose(
         robot=robot, estimation=logs[:2], validation=logs[2:], settings=Settings(bootstrap=100)

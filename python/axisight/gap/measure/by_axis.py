@@ -6,7 +6,7 @@ the wrist. The verdict for the whole arm stays *unknown*, and the causes are rep
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,7 +37,7 @@ def believed_by_axis(found: SearchState, fitter: ModelFitter, settings: Settings
     well = [s.axis for _, s in found.accepted if share[s.axis] >= settings.explained_share]
     if not well:
         return found
-    kept = [f for f, axis in _led(found) if axis in well or f.sure]
+    kept = [f for f, axis in led(found) if axis in well or f.sure]
     return replace(_with_only(found, fitter, kept), by_axis=not arm)
 
 
@@ -46,11 +46,11 @@ def without_axis(found: SearchState, fitter: ModelFitter, axis: int) -> SearchSt
 
     The other causes explain their axes, whatever the share of the whole arm that they explain.
     """
-    kept = [f for f, led in _led(found) if led != axis]
+    kept = [f for f, led in led(found) if led != axis]
     return replace(_with_only(found, fitter, kept), by_axis=True)
 
 
-def _led(found: SearchState) -> list[tuple[Hypothesis, int]]:
+def led(found: SearchState) -> list[tuple[Hypothesis, int]]:
     """Return every cause with the axis (from 0) that it led."""
     return [(f, s.axis) for f, (_, s) in zip(found.model.free, found.accepted, strict=True)]
 
@@ -65,12 +65,13 @@ def _with_only(found: SearchState, fitter: ModelFitter, kept: list[Hypothesis]) 
 
 @dataclass(frozen=True)
 class OwnAxes:
-    """Errors on the validation logs that show whether causes hold on the ``axes`` (from 0) that they explain.
+    """Errors on the validation logs that show whether causes hold on the ``axes`` that they explain.
 
+    ``axes``: the labels of the causes by the axis (from 0) that they led; a heavier link may lead any axis below it.
     ``given``, ``after``: errors of the simulator as given and with the causes; ``change``: torque change by the causes.
     """
 
-    axes: Sequence[int]
+    axes: Mapping[int, tuple[str, ...]]
     given: Stage
     after: Stage
     change: Stage
@@ -80,4 +81,6 @@ class OwnAxes:
         given, after, change = (
             np.mean(s.per_log(), axis=0) for s in (self.given, self.after, self.change)
         )
-        return next((i for i in self.axes if given[i] - after[i] < _CARRIED * change[i]), None)
+        return next(
+            (i for i in sorted(self.axes) if given[i] - after[i] < _CARRIED * change[i]), None
+        )

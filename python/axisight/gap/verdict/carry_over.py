@@ -83,7 +83,7 @@ def carried_over(
         withdrawn = Withdrawal("loud", gap.before, gap.refitted, gap.floor)
     elif own is not None:
         # Another motion may show more of what no effect explains, and as much of the causes.
-        withdrawn = _no_fall_there(own, stages, names, conclusion)
+        withdrawn = _no_fall_there(own, stages, names)
     elif conclusion.causes and removed is not None and _of_no_size(conclusion, stages, removed):
         return _nothing(conclusion)
     elif conclusion.causes:
@@ -231,17 +231,14 @@ def _no_fall(
     return _on("fall", stages, (log, axis), before, after, names, causes)
 
 
-def _no_fall_there(
-    own: OwnAxes, stages: Stages, names: Sequence[str], conclusion: Conclusion
-) -> Withdrawal | None:
+def _no_fall_there(own: OwnAxes, stages: Stages, names: Sequence[str]) -> Withdrawal | None:
     """Return the contradiction where the causes of an axis do not shrink its gap."""
     axis = own.not_carried()
     if axis is None:
         return None
     given, left = _squares(stages.given), _squares(stages.after)
     log = int(np.argmax((left - given)[:, axis]))
-    mine = tuple(c.label for c in conclusion.causes if axis + 1 in (c.axis, *(c.axes or ())))
-    return _on("axis", stages, (log, axis), given, left, names, mine)
+    return _on("axis", stages, (log, axis), given, left, names, own.axes[axis])
 
 
 def _above_floor(stages: Stages, names: Sequence[str]) -> Withdrawal | None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from axisight.gap.facts.settings import Settings
-from axisight.gap.measure.by_axis import OwnAxes, without_axis
+from axisight.gap.measure.by_axis import OwnAxes, led, without_axis
 from axisight.gap.measure.reach import Reach, reach_of, refitted_errors
 from axisight.gap.measure.where import ErrorLog, stands_out
 from axisight.gap.ranking.intervals import with_own_scatter
@@ -55,7 +55,7 @@ def validated(
         causes = with_own_scatter(conclusion.causes, view.fitter.tolerated)
         conclusion = replace(conclusion, causes=causes)
         reach = reach_of(view, held_logs, found, conclusion.effects, settings)
-        own = _axes_alone(view, conclusion, reach)
+        own = _axes_alone(view, conclusion, found, reach)
         axis = None if own is None else own.not_carried()
         if own is None or axis is None or axis in lost or len(own.axes) < 2:
             return Validated(found, errors, conclusion.with_checks([*lost.values()]), reach, own)
@@ -66,10 +66,16 @@ def validated(
         found = with_balanced_values(without_axis(found, view.fitter, axis), view.fitter)
 
 
-def _axes_alone(view: View, conclusion: Conclusion, reach: Reach) -> OwnAxes | None:
+def _axes_alone(
+    view: View, conclusion: Conclusion, found: SearchState, reach: Reach
+) -> OwnAxes | None:
     """Return how causes fare on their axes, where errors of axes add up."""
     arm = any(c.axis is None for c in conclusion.causes)
     if not view.fitter.adds_up or not conclusion.causes or arm:
         return None
-    axes = sorted({c.axis - 1 for c in conclusion.causes if c.axis is not None})
+    leads = {cause.effect.label: axis for cause, axis in led(found)}
+    axes: dict[int, tuple[str, ...]] = {}
+    for c in conclusion.causes:
+        axis = leads.get(c.label, (c.axis or 1) - 1)
+        axes[axis] = (*axes.get(axis, ()), c.label)
     return OwnAxes(axes, reach.stages.given, reach.stages.after, reach.change)

@@ -118,5 +118,7 @@ def test_causes_carry_over_where_most_of_their_size_is_there(share, carried):
     # Of a change d of the torque the machine shows `share`: the gap goes from (s d)^2 to (s d - d)^2.
     change = 0.09
     given, after = share**2 * change, (share - 1) ** 2 * change
-    own = OwnAxes([0], one_log(given + 1.0), one_log(after + 1.0), one_log(change))
+    own = OwnAxes(
+        {0: ("coulomb_friction@1",)}, one_log(given + 1.0), one_log(after + 1.0), one_log(change)
+    )
     assert (own.not_carried() is None) == carried
