@@ -51,7 +51,7 @@ impl RobotDescription {
             })
             .collect();
         let last = joints.len() - 1;
-        joints[last].link = Some(link.clone());
+        joints[last].link = Some(*link);
         let n = joints.len();
         joints.extend(self.joints.iter().cloned().map(|joint| Joint {
             parent: Some(joint.parent.map_or(last, |parent| parent + n)),
