@@ -264,3 +264,9 @@ def test_the_page_shows_an_entry_and_the_table_of_its_data(repository: Path) -> 
     assert [(c["effect"], c["axis"]) for c in read["causes"]] == [("coulomb_friction", 2)]
     measured = json.loads((repository / "docs" / "data" / "public_test.json").read_text("utf-8"))
     assert comparison_table(measured).strip() in page
+
+
+def test_published_entries_can_be_scored(repository: Path) -> None:
+    for path in (repository / "benches" / "public_entries").glob("*.jsonl"):
+        for text, where in entries_in(path).values():
+            assert as_verdict(json.loads(text), where)["provenance"]["seconds"] > 0
