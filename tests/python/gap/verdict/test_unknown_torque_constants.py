@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from axisight import load_robot
 from axisight.gap.verdict.unknown_torque_constants import _constants_like
 
 
@@ -27,4 +28,5 @@ from axisight.gap.verdict.unknown_torque_constants import _constants_like
 )
 def test_constants_of_the_axes_that_feel_a_cause(effect, axis, like):
     cause = SimpleNamespace(effect=effect, axis=axis)
-    assert _constants_like(cause, [1, 2, 3]) == tuple(f"torque_constant@{i}" for i in like)
+    found = _constants_like(cause, [1, 2, 3], load_robot("cobot_like"))
+    assert found == tuple(f"torque_constant@{i}" for i in like)
