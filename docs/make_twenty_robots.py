@@ -1,13 +1,11 @@
 """Write docs/twenty_robots.md from the texts, table and results in benches (twenty_robots_page.md, .toml, .json).
 
-Usage: python docs/make_twenty_robots.py [--check]
+Usage: python docs/make_twenty_robots.py
 
 `benches/twenty_robots.py` writes the JSON; its page says how.
 """
 
-import argparse
 import json
-import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -94,19 +92,5 @@ def render() -> str:
     return text
 
 
-def main() -> int:
-    """Write the page, or with --check say whether it is up to date."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--check", action="store_true", help="fail if the page is out of date")
-    page = render()
-    if not parser.parse_args().check:
-        PAGE.write_text(page, encoding="utf-8")
-        return 0
-    if PAGE.is_file() and PAGE.read_text(encoding="utf-8") == page:
-        return 0
-    print(f"{PAGE.name} is out of date: run `make docs`", file=sys.stderr)
-    return 1
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    PAGE.write_text(render(), encoding="utf-8")

@@ -35,9 +35,12 @@ def entries_in(path: Path) -> dict[str, tuple[str, str]]:
     """
     found: dict[str, tuple[str, str]] = {}
     if path.is_dir():
-        found = {one.stem: (_read(one), str(one)) for one in sorted(path.glob("*.json"))}
+        found = {
+            one.stem: (read_stated(one, "a verdict"), str(one))
+            for one in sorted(path.glob("*.json"))
+        }
     elif path.suffix == ".jsonl" and path.is_file():
-        for number, line in enumerate(_read(path).splitlines(), 1):
+        for number, line in enumerate(read_stated(path, "entries").splitlines(), 1):
             where = f"{path}, line {number}"
             case = _case_of(line, where)
             if case in found:
@@ -50,11 +53,12 @@ def entries_in(path: Path) -> dict[str, tuple[str, str]]:
     return found
 
 
-def _read(path: Path) -> str:
+def read_stated(path: Path, what: str) -> str:
+    """Return the text of a file; raise InputError, which says ``what`` it holds, if it cannot be read."""
     try:
         return read_text(path)
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: expected a verdict: {error}") from error
+        raise InputError(f"{path}: expected {what}: {error}") from error
 
 
 def _case_of(line: str, where: str) -> str:

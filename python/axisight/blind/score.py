@@ -11,9 +11,15 @@ import numpy as np
 import scipy
 
 from axisight.arguments import short
-from axisight.blind.entries import COUNTED_ALTERNATIVE, NO_ENTRY, as_verdict, entries_in
+from axisight.blind.entries import (
+    COUNTED_ALTERNATIVE,
+    NO_ENTRY,
+    as_verdict,
+    entries_in,
+    read_stated,
+)
 from axisight.blind.sealed import SEAL, seal_of
-from axisight.documents import parse_json, read_text
+from axisight.documents import parse_json
 from axisight.effects import effect_table
 from axisight.errors import InputError
 from axisight.gap.ranking.twins import TWIN_SHARE, twins_of
@@ -125,8 +131,8 @@ def judged_cases(cases: Path, truths: Path, verdicts: Path, *, every: bool = Fal
 
 def _judged_case(cases: Path, truths: Path, name: str, entry: tuple[str, str] | None) -> Judged:
     held = truths / f"{name}.json"
-    text = _read(held, "the truth of a verdict")
-    seal = _read(cases / name / SEAL, "the seal of a case").strip()
+    text = read_stated(held, "the truth of a verdict")
+    seal = read_stated(cases / name / SEAL, "the seal of a case").strip()
     if seal_of(text) != seal:
         raise InputError(f"{held}: expected the truth its case was sealed with")
     truth = _parsed(held, text)
@@ -143,13 +149,6 @@ def _judged_case(cases: Path, truths: Path, name: str, entry: tuple[str, str] | 
             f"{where}: expected a verdict as axisight writes it, and its truth, got one that is damaged "
             f"({short(repr(error))})"
         ) from error
-
-
-def _read(path: Path, what: str) -> str:
-    try:
-        return read_text(path)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: expected {what}: {error}") from error
 
 
 def _parsed(path: Path | str, text: str) -> dict[str, Any]:

@@ -57,16 +57,15 @@ class ModelOptions:
 
     def given(self) -> list[str]:
         """Return the options that were given."""
-        return [f"--{name}" for name, value in vars(self).items() if value]
+        return [f"--{name}" for name, value in vars(self).items() if value not in (None, [], ())]
 
     def drives(self, source: Path | str, file: Path | None = None) -> DriveData:
         """Return the drive data of a model, from ``file`` or beside the model, updated by the given options.
 
         Raises InputError for a payload that is not KG or KG,X,Y,Z.
         """
-        said: dict[str, object] = {"base": self.base}
-        if self.tips:
-            said["tip"] = self.tips[0] if len(self.tips) == 1 else list(self.tips)
+        tip = self.tips[0] if len(self.tips) == 1 else list(self.tips) or None
+        said: dict[str, object] = {"base": self.base, "tip": tip}
         if self.payload is not None:
             said["payload"] = _payload(self.payload)
         stated = {name: value for name, value in said.items() if value is not None}

@@ -49,6 +49,8 @@ class ContactCheck:
         (2,), standard deviation of a component of force and moment, from sample to sample; (1,) if hung.
     intervals_s
         Times (begin, end) [s] at which a size exceeds its limit, from the first sample.
+    sample_time_s
+        Sample time [s].
     """
 
     residual: Array
@@ -56,6 +58,7 @@ class ContactCheck:
     limit: Array
     noise: Array
     intervals_s: tuple[tuple[float, float], ...]
+    sample_time_s: float
 
     @property
     def is_free(self) -> bool:
@@ -121,41 +124,17 @@ def contact_check(
         limit=limit,
         noise=noise,
         intervals_s=_intervals((size > limit).any(axis=1), step),
-    )
-
-
-def refuse_contact(
-    robot: Robot,
-    q: ArrayLike,
-    v: ArrayLike,
-    a: ArrayLike,
-    base: BaseMotion,
-    *,
-    wrench: ArrayLike | None = None,
-    hung_at_m: ArrayLike | None = None,
-    parameters: ArrayLike | None = None,
-    sample_time_s: float | None = None,
-    tolerance: float = TOLERANCE,
-) -> ContactCheck:
-    """Return :func:`contact_check`; raise ContactError with the intervals if there is a contact."""
-    step = robot.sample_time_s if sample_time_s is None else sample_time_s
-    found = contact_check(
-        robot,
-        q,
-        v,
-        a,
-        base,
-        wrench=wrench,
-        hung_at_m=hung_at_m,
-        parameters=parameters,
         sample_time_s=step,
-        tolerance=tolerance,
     )
+
+
+def refuse_contact(found: ContactCheck) -> None:
+    """Raise ContactError with the intervals of a check that found a contact."""
     if found.is_free:
-        return found
+        return
     said = []
     for begin, end in found.intervals_s[:5]:
-        part = slice(round(begin / step), round(end / step) + 1)
+        part = slice(round(begin / found.sample_time_s), round(end / found.sample_time_s) + 1)
         units = zip(
             found.size[part].max(axis=0).tolist(), ("N", "Nm")[-found.size.shape[1] :], strict=True
         )

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from axisight.arguments import one_of, positive
 from axisight.errors import InputError
-from axisight.rigid_body.contact import refuse_contact
+from axisight.rigid_body.contact import contact_check, refuse_contact
 from axisight.rigid_body.coordinates import floating_motion
 from axisight.rigid_body.estimate import identify_rigid_body, row_weights
 from axisight.rigid_body.regressor import TorqueModel, rows
@@ -77,11 +77,17 @@ def identify_floating(
         raise InputError(f"wrench: expected {n} rows as q, got {len(outside)}")
     target = _target(model, outside, torque_nm)
     if contact == "refuse":
-        step = model.robot.sample_time_s if sample_time_s is None else sample_time_s
-        hung = model.hung_at_m
-        refuse_contact(
-            model.robot, q, v, a, base, wrench=outside, hung_at_m=hung, sample_time_s=step
+        found = contact_check(
+            model.robot,
+            q,
+            v,
+            a,
+            base,
+            wrench=outside,
+            hung_at_m=model.hung_at_m,
+            sample_time_s=sample_time_s,
         )
+        refuse_contact(found)
     if mass_kg is not None and model.n_base_rows < 6:
         raise InputError("mass_kg: expected none with hung_at_m, whose equations have no force")
     if mass_kg is not None:

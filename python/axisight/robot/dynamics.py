@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from axisight import _core
-from axisight.errors import InputError
+from axisight.errors import InputError, RobotError
 from axisight.robot.base_motion import BaseMotion
 from axisight.robot.description import Link
 
@@ -40,10 +40,10 @@ def coordinate_names(core: _core.Robot) -> list[str]:
     return base + core.joint_names
 
 
-def refuse_floating(core: _core.Robot, what: str, advice: str) -> None:
-    """Raise InputError for a robot with a floating base; ``what`` needs a fixed one."""
+def need_fixed_base(core: _core.Robot, what: str, advice: str) -> None:
+    """Raise RobotError for a robot with a floating base; ``what`` needs a fixed one."""
     if _core.floating_base(core) is not None:
-        raise InputError(
+        raise RobotError(
             f"robot {core.name!r}: {what}: expected a fixed base, got a floating one; {advice}"
         )
 
@@ -58,7 +58,7 @@ def inertia_matrix(core: _core.Robot, q: ArrayLike) -> Array:
 
 def bias(core: _core.Robot, q: ArrayLike, v: ArrayLike) -> Array:
     """Return Coriolis, centrifugal and gravity forces; see `Robot.bias`."""
-    refuse_floating(core, "bias", "use inverse_dynamics with a motion of the base")
+    need_fixed_base(core, "bias", "use inverse_dynamics with a motion of the base")
     (rows, rates), single = joint_rows(core.n_joints, q=q, v=v)
     out = core.bias(rows, rates)
     return out[0] if single else out
@@ -66,7 +66,7 @@ def bias(core: _core.Robot, q: ArrayLike, v: ArrayLike) -> Array:
 
 def gravity(core: _core.Robot, q: ArrayLike) -> Array:
     """Return gravity forces; see `Robot.gravity`."""
-    refuse_floating(core, "gravity", "use inverse_dynamics with BaseMotion.at_rest")
+    need_fixed_base(core, "gravity", "use inverse_dynamics with BaseMotion.at_rest")
     (rows,), single = joint_rows(core.n_joints, q=q)
     out = core.gravity(rows)
     return out[0] if single else out

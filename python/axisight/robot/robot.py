@@ -475,7 +475,7 @@ class Robot:
         Shape (n_accelerometers, 3) or (n, n_accelerometers, 3), NaN where no direction is measured. Arguments
         and errors are those of `inverse_dynamics`.
         """
-        dynamics.refuse_floating(self.core, "accelerometers", "leave them out")
+        dynamics.need_fixed_base(self.core, "accelerometers", "leave them out")
         (rows, rates, accelerations), single = dynamics.joint_rows(self.n_joints, q=q, v=v, a=a)
         out = _core.specific_force(self.core, rows, rates, accelerations)
         # Without readings, the core cannot say how many rows there are.

@@ -115,3 +115,11 @@ def test_every_row_of_the_table_is_an_entry_with_a_name_of_its_own(bench: Module
     hand = next(entry for entry in table if entry.kind == "hand")
     assert hand.ends() == ["--tip", hand.tip]
     assert hand.ends(whole_tree=True) == ["--whole-tree"]
+
+
+def test_the_page_is_made_from_the_stored_results(
+    repository: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(repository / "docs")
+    page = (repository / "docs" / "twenty_robots.md").read_text(encoding="utf-8")
+    assert page == importlib.import_module("make_twenty_robots").render(), "run `make docs`"

@@ -46,7 +46,7 @@ def without_axis(found: SearchState, fitter: ModelFitter, axis: int) -> SearchSt
 
     The other causes explain their axes, whatever the share of the whole arm that they explain.
     """
-    kept = [f for f, led in led(found) if led != axis]
+    kept = [f for f, place in led(found) if place != axis]
     return replace(_with_only(found, fitter, kept), by_axis=True)
 
 

@@ -46,6 +46,7 @@ def _constants_like(cause: NamedCause, axes: Sequence[int], robot: Robot) -> tup
         felt = [axis for axis in axes if axis == cause.axis]
     elif cause.axis is not None and scales == "carriers":
         # A link weighs on what carries it.
-        felt = [axis for axis in axes if axis in carriers(robot)[cause.axis]]
+        carrying = carriers(robot)[cause.axis]
+        felt = [axis for axis in axes if axis in carrying]
     units = [info.name for info in effect_table().values() if info.torque_unit]
     return tuple(Effect(name, axis).label for axis in felt for name in units)

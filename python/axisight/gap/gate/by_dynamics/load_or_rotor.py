@@ -15,7 +15,8 @@ from axisight.robot.branches import tips
 
 Array = NDArray[np.float64]
 
-# Places of a unit mass in the frame of the last link [m], whose torques give those of any load to first order.
+# Places of a unit mass in the frame of the last link [m], whose torques give those of any load to first order; but
+# for the first, they are shifts of a centre of mass, too.
 _PLACES = ((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1))
 
 
@@ -44,20 +45,14 @@ def load_torques(robot: Robot, at: Motion, bodies: Array) -> list[Array]:
 
 def _loads(robot: Robot) -> list[Effect]:
     """Return effects that add masses on the last links: at places of a chain, else by mass and centre of each tip."""
+    places = [dict(zip(("x_m", "y_m", "z_m"), place, strict=True)) for place in _PLACES]
     if robot.is_chain:
-        masses = [dict(zip(("x_m", "y_m", "z_m"), place, strict=True)) for place in _PLACES]
-        return [Effect(LOAD, None, {"mass_kg": 1.0, **at}) for at in masses]
-    moved = [
-        dict.fromkeys(("x_m", "y_m", "z_m"), 0.0) | {name: 0.1} for name in ("x_m", "y_m", "z_m")
-    ]
-    return [
-        one
-        for axis in tips(robot)
-        for one in (
-            Effect(LINK_MASS, axis, {"relative_change": 1.0}),
-            *(Effect(LINK_COM, axis, shift) for shift in moved),
-        )
-    ]
+        return [Effect(LOAD, None, {"mass_kg": 1.0, **place}) for place in places]
+    out = []
+    for axis in tips(robot):
+        out.append(Effect(LINK_MASS, axis, {"relative_change": 1.0}))
+        out += [Effect(LINK_COM, axis, shift) for shift in places[1:]]
+    return out
 
 
 def _left(torque: Array, columns: Array) -> float:
