@@ -292,7 +292,9 @@ def test_what_has_no_floating_base_says_so():
         identify_floating(ROBOT, q, v, a, base, torque, side="base")
     with pytest.raises(InputError, match="energy"):
         energy_regressor(TorqueModel(ROBOT), q, v)
-    with pytest.raises(RobotError, match="identify_logs: expected a fixed base, got a floating one"):
+    with pytest.raises(
+        RobotError, match="identify_logs: expected a fixed base, got a floating one"
+    ):
         identify_logs(ROBOT, [object()])  # type: ignore[list-item]
     fixed = Robot.from_toml(
         ROBOT.toml[: ROBOT.toml.index("[base]")] + ROBOT.toml[ROBOT.toml.index("[[joint]]") :]
