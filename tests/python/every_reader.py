@@ -2,7 +2,8 @@
 
 import shutil
 
-from axisight.blind.score import _parsed, _read
+from axisight.blind.entries import read_stated
+from axisight.blind.score import _parsed
 from axisight.excitation import load_design, read_design, read_references
 from axisight.logs import load_column_map, parse_column_map, read_case, read_log
 from axisight.montecarlo import read_study
@@ -38,7 +39,7 @@ READERS = {
     "study": read_study,
     "design": lambda path: read_design(load_design(path), str(path)),
     "drives": read_drives,
-    "verdict": lambda path: _parsed(path, _read(path, "a verdict")),
+    "verdict": lambda path: _parsed(path, read_stated(path, "a verdict")),
     "sidecar": read_sidecar,
     "store": lambda path: Store(path).begun_with(),
     "models": import_robot,
