@@ -17,15 +17,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from kuka_forward_map import (
-    MotionEstimator,
-    Physics,
-    identify,
-    measured,
-    motion,
-    simulated,
-    spread,
-)
+from kuka_forward_motion import INFLATION, SOFT_RAD_S, MotionEstimator, MotionPrior
+from kuka_forward_physics import Physics, identify, measured, motion, simulated
+from kuka_forward_search import FROM_NEAR, refined, searched
 from kuka_forward_start import Recognition
 from numpy.typing import NDArray
 from scipy.io import loadmat
@@ -99,7 +93,10 @@ def read(path: Path, *, with_test: bool) -> Benchmark:
 
 @dataclass(frozen=True)
 class Schedule:
-    """Rests that all training recordings share: samples at rest, of usable torque, and stretches between rests."""
+    """Rests that all training recordings share: samples at rest, of usable torque, and stretches between rests.
+
+    All stretches are as long as the shortest.
+    """
 
     rest: NDArray[np.bool_]
     used: NDArray[np.bool_]
@@ -121,15 +118,16 @@ def schedule(train: list[Recording], step_s: float) -> Schedule:
         rest[a:b] = True
         used[max(a - MARGIN[1], 0) : b + MARGIN[0]] = False
     starts = [0, *((a + b) // 2 for a, b in edges[1:-1]), n]
-    return Schedule(rest, used, [slice(a, b) for a, b in pairwise(starts)])
+    length = int(np.diff(starts).min())
+    return Schedule(rest, used, [slice(int(a), int(a) + length) for a in starts[:-1]])
 
 
-# Inflation of the torque error, softening of dry friction [rad/s], and steps, from coarse to fine.
-COARSE = ((8.0, 0.1, 8), (4.0, 0.05, 10))
-FINE = ((2.0, 0.02, 12), (1.4, 0.005, 12), (1.4, 0.001, 10))
-RECOGNITIONS = 2
-HOPS = (1,)
-"""Axes whose motion is exchanged for another start: axis 2 is slow, and its friction is ambiguous."""
+NETWORKS, TRAINING_MOTIONS = 2, 6000
+SHARES = (0.5, 0.2)
+"""Errors of a rough motion, as shares of the size of training motions; each gives a start of the search."""
+ROUNDS = 60
+REPEATED = 3
+"""Motions 4 to 6 repeat motions 1 to 3, in all training recordings."""
 
 
 @dataclass(frozen=True)
@@ -138,17 +136,14 @@ class Model:
 
     physics: Physics
     error_nm: Array
-    prior: Array
+    prior: MotionPrior
     plan: Schedule
     starts: list[Recognition]
     step_s: float
 
     def estimator(self, at: slice) -> MotionEstimator:
         """Return the estimator of a stretch."""
-        plan = self.plan
-        return MotionEstimator(
-            self.physics, self.error_nm, self.prior, plan.rest[at], plan.used[at], self.step_s
-        )
+        return MotionEstimator(self.physics, self.error_nm, self.prior, self.plan.used[at])
 
 
 def trained(train: list[Recording], step_s: float) -> Model:
@@ -161,20 +156,17 @@ def trained(train: list[Recording], step_s: float) -> Model:
     physics, _ = identify(
         torque_model, [(r.torque_nm, r.position_rad) for r in train], plan.used, step_s
     )
-    fast_slow = torque_errors(physics, train, plan.used, step_s)
-    shortest = min(at.stop - at.start for at in plan.stretches)
-    stretches = [
-        (r.torque_nm[at][:shortest], r.position_rad[at][:shortest])
-        for r in train
-        for at in plan.stretches
-    ]
-    usable = plan.used[plan.stretches[0]][:shortest]
+    errors = torque_errors(physics, train, plan.used, step_s)
+    stretches = [(r.torque_nm[at], r.position_rad[at]) for r in train for at in plan.stretches]
+    prior = MotionPrior.of(np.stack([q for _, q in stretches]), step_s)
+    usable = plan.used[plan.stretches[0]]
     starts = [
-        Recognition(stretches, physics, fast_slow[0], usable, step_s, seed)
-        for seed in range(RECOGNITIONS)
+        Recognition(
+            stretches, physics, prior, errors, usable, step_s, count=TRAINING_MOTIONS, seed=seed
+        )
+        for seed in range(NETWORKS)
     ]
-    prior = spread([r.position_rad for r in train], step_s)
-    return Model(physics, fast_slow, prior, plan, starts, step_s)
+    return Model(physics, errors, prior, plan, starts, step_s)
 
 
 def torque_errors(
@@ -193,49 +185,44 @@ def torque_errors(
     )
 
 
-def refined(
-    estimator: MotionEstimator, u: Array, c: Array, stages: tuple[tuple[float, float, int], ...]
-) -> tuple[float, Array]:
-    """Return cost and coefficients after stages of decreasing softening."""
-    cost = np.inf
-    for inflate, soft, steps in stages:
-        c, cost = estimator.improve(u, c, soft, inflate, steps)
-    return cost, c
+def joined(plan: Schedule, parts: list[Array]) -> Array:
+    """Return positions (n, 6) of the whole recording; at the rests between the stretches they are zero."""
+    out = np.zeros((len(plan.rest), 6))
+    for at, part in zip(plan.stretches, parts, strict=True):
+        out[at] = part
+    return out
 
 
 def estimated(model: Model, u: Array) -> tuple[Array, list[float]]:
     """Return the most probable positions (n, 6) given all torques, not causal, and the cost of each motion."""
-    out, costs = [], []
-    for at in model.plan.stretches:
-        part, estimator = u[at], model.estimator(at)
-        found = []
-        for recognize in model.starts:
-            q, v = recognize(part)
-            c = estimator.started(q, v, 2.0 * model.prior[1], 1.2 * model.prior[2])
-            found.append(refined(estimator, part, c, COARSE + FINE))
-        cost, best = min(found, key=lambda x: x[0])
-        for axis in HOPS:
-            for other in [np.zeros(len(best)), *(c[:, axis] for _, c in found)]:
-                trial = best.copy()
-                trial[:, axis] = other
-                value, trial = refined(estimator, part, trial, FINE)
-                if value < cost:
-                    cost, best = value, trial
-        out.append(estimator.position(best))
+    positions, costs = [], []
+    pools: list[list[Array]] = []
+    for k, at in enumerate(model.plan.stretches):
+        estimator = model.estimator(at)
+        if k < REPEATED:
+            rough = [recognize(u[at]) for recognize in model.starts]
+            starts = [estimator.started(q, v, share) for q, v in rough for share in SHARES]
+            found = searched(estimator, u[at], starts, ROUNDS, np.random.default_rng(k))
+        else:
+            near = [refined(estimator, u[at], c, FROM_NEAR) for c in pools[k - REPEATED]]
+            found = sorted(near, key=lambda f: f[0])
+        pools.append([c for _, c in found])
+        cost, best = found[0]
+        positions.append(estimator.position(best))
         costs.append(cost)
-    return np.concatenate(out), costs
+    return joined(model.plan, positions), costs
 
 
 def from_the_truth(model: Model, record: Recording) -> tuple[Array, list[float]]:
     """Return the optimum nearest the measured motion, which a prediction cannot use, and its costs."""
-    out, costs = [], []
+    positions, costs = [], []
     for at in model.plan.stretches:
         estimator = model.estimator(at)
         c = estimator.coefficients(record.position_rad[at])
-        cost, c = refined(estimator, record.torque_nm[at], c, FINE[1:])
-        out.append(estimator.position(c))
+        cost, c = refined(estimator, record.torque_nm[at], c, ((INFLATION, SOFT_RAD_S, 25),))
+        positions.append(estimator.position(c))
         costs.append(cost)
-    return np.concatenate(out), costs
+    return joined(model.plan, positions), costs
 
 
 def nrmse(position: Array, record: Recording) -> Array:
@@ -270,8 +257,8 @@ def report(model: Model, name: str, record: Recording) -> Array:
     ):
         position = simulated(model.physics, u, rest, model.step_s)
         print(row(label, "yes", position, record), flush=True)
-    rough = np.concatenate([model.starts[0](u[at])[0] for at in model.plan.stretches])
-    print(row("regression alone (start)", "no", rough, record), flush=True)
+    rough = joined(model.plan, [model.starts[0](u[at])[0] for at in model.plan.stretches])
+    print(row("network alone (start)", "no", rough, record), flush=True)
     ours, found = estimated(model, u)
     print(row("most probable motion", "no", ours, record), flush=True)
     bound, nearest = from_the_truth(model, record)
