@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from axisight import Diagnosis, Effect, Log, diagnose, load_robot, read_log, sig
 from axisight.cli import app
 from axisight.errors import InputError, MissingExtraError
 from axisight.logs.sources_bag import load_bag
+from axisight.signal_files.first_view import first_view
 from import_data import URDF, written
 from model_logs import written_log
 
@@ -66,6 +68,20 @@ def test_residuals_are_those_of_the_gap(arm: Diagnosis):
     assert gap_of(arm, "before") == pytest.approx(arm.gap.before, rel=0.01)
     assert gap_of(arm, "after") == pytest.approx(arm.gap.after, rel=0.01)
     assert arm.gap.after < 0.1 * arm.gap.before
+    # Inverse dynamics simulates no motion.
+    assert not [name for name in arm.signals[0] if re.match("simulated.*position", name)]
+
+
+def test_viewers_begin_at_the_largest_gap(arm: Diagnosis):
+    assert arm.gap.before_per_axis[0] > arm.gap.before_per_axis[1]
+    for data in arm.signals:
+        np.testing.assert_array_equal(data["gap_before"], arm.gap.before_per_axis)
+    found = first_view(arm.signals)
+    assert (found.log, found.axis) == (2, 0)
+    residual = arm.signals[2]["residual_before_torque_nm"]
+    here = residual.sel(time_s=slice(found.start_s, found.stop_s))
+    # Dry friction of one size, but at rest and at reversals.
+    assert float((here[:, 0] ** 2).mean()) >= float((residual[:, 0] ** 2).mean())
 
 
 def test_in_closed_loop_they_are_as_logged():
@@ -92,7 +108,17 @@ def test_in_closed_loop_they_are_as_logged():
     found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:], signals=True)
     assert found.mode == "closed_loop"
     assert "lowpass_hz" not in found.signals[0].attrs
-    np.testing.assert_array_equal(found.signals[2]["measured_torque_nm"], logs[2].torque_nm)
+    held = found.signals[2]
+    np.testing.assert_array_equal(held["measured_torque_nm"], logs[2].torque_nm)
+    np.testing.assert_array_equal(held["measured_position_rad"], logs[2].position_rad)
+    # The simulator with the friction of the machine moves as the machine does.
+    off = {
+        stage: float(
+            abs(held[f"simulated_{stage}_position_rad"] - held["measured_position_rad"]).max()
+        )
+        for stage in ("before", "after")
+    }
+    assert off["after"] < 0.1 * off["before"]
     assert gap_of(found, "before") == pytest.approx(found.gap.before, rel=1e-9)
     assert gap_of(found, "after") == pytest.approx(found.gap.after, rel=1e-9)
 
@@ -107,16 +133,17 @@ def test_unasked_there_are_none(arm: Diagnosis, tmp_path: Path):
 def test_a_table_has_every_log(arm: Diagnosis, tmp_path: Path):
     path = signal_files.write_signals(arm.signals, tmp_path / "new" / "out.parquet")
     made = pq.read_table(path)
-    columns = [f"{name}_torque_nm_{axis}" for name in NAMES for axis in (1, 2)]
+    names = [*(f"{name}_torque_nm" for name in NAMES), "measured_position_rad"]
+    columns = [f"{name}_{axis}" for name in names for axis in (1, 2)]
     assert made.column_names == ["log", "role", "time_s", *columns]
     rows = made.to_pandas()
     for data in arm.signals:
         mine = rows[rows["log"] == data.attrs["log"]]
         assert set(mine["role"]) == {data.attrs["role"]}
         np.testing.assert_array_equal(mine["time_s"], data["time_s"])
-        for name in NAMES:
-            columns = [f"{name}_torque_nm_{axis}" for axis in (1, 2)]
-            np.testing.assert_array_equal(mine[columns], data[f"{name}_torque_nm"])
+        for name in names:
+            columns = [f"{name}_{axis}" for axis in (1, 2)]
+            np.testing.assert_array_equal(mine[columns], data[name])
     said = json.loads(made.schema.metadata[b"axisight"])
     assert said["joints"] == ["shoulder", "elbow"]
     assert said["units"] == ["Nm", "Nm"]
@@ -136,6 +163,9 @@ def test_a_recording_has_joint_states(arm: Diagnosis, tmp_path: Path):
             for i, joint in enumerate(("shoulder", "elbow")):
                 found = arrays[f"{topic}.{name}.effort.{joint}"]
                 np.testing.assert_array_equal(found, data[f"{name}_torque_nm"].values[:, i])
+        for i, joint in enumerate(("shoulder", "elbow")):
+            found = arrays[f"{topic}.measured.position.{joint}"]
+            np.testing.assert_array_equal(found, data["measured_position_rad"].values[:, i])
 
 
 def test_names_of_logs_become_topics(arm: Diagnosis, tmp_path: Path):
@@ -148,7 +178,10 @@ def test_names_of_logs_become_topics(arm: Diagnosis, tmp_path: Path):
 def test_misuse_is_named_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     there = written(tmp_path, "x", "there.parquet")
     for target, message in (
-        (tmp_path / "out.csv", r"expected \.parquet or \.mcap for signals, got '\.csv'"),
+        (
+            tmp_path / "out.csv",
+            r"expected \.parquet, \.mcap or \.rrd for signals, got '\.csv'",
+        ),
         (there, "exists: choose another name"),
         (there / "out.mcap", "expected a folder to write into"),
     ):
@@ -160,6 +193,8 @@ def test_misuse_is_named_before_the_work(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr("axisight.signal_files.target.find_spec", lambda _: None)
     with pytest.raises(MissingExtraError, match=r"pip install 'axisight\[ros\]'"):
         signal_files.check_target(tmp_path / "out.mcap")
+    with pytest.raises(MissingExtraError, match=r"pip install 'axisight\[rerun\]'"):
+        signal_files.check_target(tmp_path / "out.rrd")
 
 
 def test_the_command_writes_them(tmp_path: Path):
@@ -167,8 +202,12 @@ def test_the_command_writes_them(tmp_path: Path):
     start = ["diagnose", *map(str, [model, *logs[:2]]), "--validation", str(logs[2]), "--signals"]
     result = CliRunner().invoke(app, [*start, str(logs[0])])
     assert (result.exit_code, "got an input" in " ".join(result.output.split())) == (2, True)
-    target = tmp_path / "out.parquet"
+    target, layout = tmp_path / "out.mcap", tmp_path / "out.foxglove.json"
+    result = CliRunner().invoke(app, [*start, str(target), "--json", str(layout)])
+    assert result.exit_code == 2
+    assert "--signals, out.foxglove.json: expected another file" in " ".join(result.output.split())
     result = CliRunner().invoke(app, [*start, str(target), "--max-causes", "1"])
     assert result.exit_code == 0, result.output
-    assert f"signals: {target}" in result.output
-    assert pq.read_table(target).num_rows == 4500
+    assert f"signals: {target}\nlayout for Foxglove: {layout}\n" in result.output
+    assert "validation.run2.measured.effort.elbow" in load_bag(target)
+    assert "Largest gap: shoulder in run2" in layout.read_text(encoding="utf-8")

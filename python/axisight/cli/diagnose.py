@@ -127,7 +127,8 @@ def diagnose_command(
         Path | None,
         typer.Option(
             rich_help_panel=OUTPUT,
-            help="Write measured and simulated torques of all logs, before and after: .parquet or .mcap.",
+            help="Write measured and simulated torques and positions of all logs, before and after: .parquet, "
+            ".mcap with a layout for Foxglove, or .rrd for Rerun.",
         ),
     ] = None,
     posterior: Annotated[

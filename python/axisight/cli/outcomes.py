@@ -23,8 +23,11 @@ _TO_SHOW = "--to-show designs one that shows what these logs would not"
 
 
 def write_found_signals(found: Diagnosis, target: Path) -> None:
-    """Write the signals of a diagnosis and print the path."""
-    say(f"signals: {axisight.signal_files.write_signals(found.signals, target, overwrite=True)}")
+    """Write the signals of a diagnosis; print the path, and that of the layout beside it."""
+    path = axisight.signal_files.write_signals(found.signals, target, overwrite=True)
+    say(f"signals: {path}")
+    for layout in axisight.signal_files.files_of(path)[1:]:
+        say(f"layout for Foxglove: {layout}")
 
 
 def write_found_remainder(found: Diagnosis, target: Path) -> None:

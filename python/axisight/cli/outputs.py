@@ -28,7 +28,7 @@ from axisight.storage import check_targets
 _RESULTS = {
     "--json": (".json",),
     "--report": (".html", ".htm"),
-    "--signals": (".parquet", ".mcap"),
+    "--signals": (".parquet", ".mcap", ".rrd"),
     "--posterior": (".nc",),
     "--remainder-table": (".toml",),
     "--write-model": (),
@@ -82,6 +82,9 @@ class Outputs:
         if self.next_experiment is not None:
             for path in experiment_files(self.next_experiment):
                 targets[f"--next-experiment, {path.name}"] = path
+        if self.signals is not None:
+            for path in axisight.signal_files.files_of(self.signals)[1:]:
+                targets[f"--signals, {path.name}"] = path
         check_targets(targets, inputs=read, replaces=_RESULTS, force=self.force)
         if self.model is not None:
             axisight.write_back.check_target(inputs.robot_source, self.model, overwrite=self.force)

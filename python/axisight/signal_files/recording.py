@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tempfile
 from collections.abc import Sequence
 from importlib import import_module
@@ -11,9 +10,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from axisight.errors import MissingExtraError
 from axisight.signal_files.about import about
+from axisight.signal_files.topics import POSITION, TORQUE, prefixes
 
 _STATE = "sensor_msgs/msg/JointState"
 _STRING = "std_msgs/msg/String"
@@ -37,39 +38,32 @@ def recording(signals: Sequence[xr.Dataset]) -> bytes:
             said = writer.add_connection("/axisight", _STRING, typestore=types)
             text = types.types[_STRING](about(signals))
             writer.write(said, _START_NS, types.serialize_cdr(text, _STRING))
-            seen: set[str] = set()
-            for data in signals:
-                _write(writer, types, _folder(data, seen), data)
+            for prefix, data in zip(prefixes(signals), signals, strict=True):
+                _write(writer, types, prefix, data)
         return next(bag.glob("*.mcap")).read_bytes()
 
 
-def _write(writer: Any, types: Any, folder: str, data: xr.Dataset) -> None:
-    """Write the signals of a log, one topic per signal."""
+def _write(writer: Any, types: Any, prefix: str, data: xr.Dataset) -> None:
+    """Write the signals of a log: a topic for measured, simulated and residual, with torques and positions."""
     known = types.types
     joints = [str(name) for name in data["joint"].values]
     stamps = _START_NS + np.round(data["time_s"].values * 1e9).astype(np.int64)
     nothing = np.zeros(0)
-    for name in data.data_vars:
-        topic = f"{folder}/{str(name).removesuffix('_torque_nm')}"
-        connection = writer.add_connection(topic, _STATE, typestore=types)
-        # Messages need contiguous rows, but filtered signals may be stored by column.
-        efforts = np.ascontiguousarray(data[name].values)
-        for stamp, effort in zip(stamps.tolist(), efforts, strict=True):
+    for base in (str(name).removesuffix(TORQUE) for name in data if str(name).endswith(TORQUE)):
+        connection = writer.add_connection(f"{prefix}/{base}", _STATE, typestore=types)
+        efforts = _rows(data, base + TORQUE)
+        positions = _rows(data, base + POSITION)
+        for i, stamp in enumerate(stamps.tolist()):
             seconds, rest = divmod(stamp, 1_000_000_000)
             time = known["builtin_interfaces/msg/Time"](sec=seconds, nanosec=rest)
             header = known["std_msgs/msg/Header"](stamp=time, frame_id="")
-            message = known[_STATE](header, joints, nothing, nothing, effort)
+            message = known[_STATE](header, joints, positions[i], nothing, efforts[i])
             writer.write(connection, stamp, types.serialize_cdr(message, _STATE))
 
 
-def _folder(data: xr.Dataset, seen: set[str]) -> str:
-    """Return a unique prefix for the topics of a log, with characters that topics allow."""
-    name = re.sub(r"\W", "_", str(data.attrs["log"]), flags=re.ASCII)
-    # In ROS each part of a topic must begin with a letter.
-    base = f"/{data.attrs['role']}/{name if name[:1].isalpha() else f'log_{name}'}"
-    found, number = base, 1
-    while found in seen:
-        number += 1
-        found = f"{base}_{number}"
-    seen.add(found)
-    return found
+def _rows(data: xr.Dataset, name: str) -> NDArray[np.float64]:
+    """Return a signal (n, n_axes), or (n, 0) if the log has none, contiguous as messages need it."""
+    if name not in data:
+        return np.zeros((data.sizes["time_s"], 0))
+    # Filtered signals may be stored by column.
+    return np.ascontiguousarray(data[name].values)

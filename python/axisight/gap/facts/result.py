@@ -353,12 +353,12 @@ class Diagnosis:
     ``refit``: relative change of the simulator's own parameters [1]. ``findings``: faults of robot file and logs that
     rule out no diagnosis, and re-fitted parameters at the edge of their tolerance. ``experiment``: what was asked for.
     ``simulator``: how far the model reproduces the user's own simulator, where its logs were given.
-    ``signals``, if asked for: a Dataset for each log, estimation logs first, with the dims (time_s, axis)
-    [Nm, N on a prismatic axis; motor side]. ``measured_torque_nm``. ``simulated_before_torque_nm`` of the
-    simulator as given, ``simulated_after_torque_nm`` of the re-fitted one with the causes: those behind
-    ``gap.before`` and ``gap.after``. ``residual_before_torque_nm`` and ``residual_after_torque_nm``: simulated
-    less measured. Attributes are ``log``, ``role``, ``mode``, ``torque`` (``logged``, or not), and
-    ``lowpass_hz`` where all signals are low-passed: by inverse dynamics.
+    ``signals``, if asked for: a Dataset for each log, estimation logs first, with the dims (time_s, axis), of motors.
+    ``measured_torque_nm`` [Nm, N on a prismatic axis]; ``simulated_before_torque_nm`` of the simulator as given,
+    ``simulated_after_torque_nm`` of the re-fitted one with the causes: those behind ``gap.before`` and
+    ``gap.after``. ``residual_before_torque_nm``, ``residual_after_torque_nm``: simulated less measured. Measured and
+    simulated ``..._position_rad`` [rad, m]; none simulated by inverse dynamics. Coordinate ``gap_before``: that of
+    ``gap``. Attributes: ``log``, ``role``, ``mode``, ``torque``, and ``lowpass_hz`` if torques are low-passed.
     ``trace``: the comparisons and moves of the search, with every rule that changed a log-weight.
     ``posterior``, if asked for: the joint distribution of the parameters of causes and simulator.
     """

@@ -47,7 +47,9 @@ class Wanted:
         if self.remainder:
             found = with_modelled_remainder(found, view, held_logs, after, settings)
         if self.signals:
-            found = replace(found, signals=signals_of(view, held_logs, after, logged=logged))
+            gap = found.gap.before_per_axis
+            signals = signals_of(view, held_logs, after, gap_before=gap, logged=logged)
+            found = replace(found, signals=signals)
         if self.posterior:
             progress("computing the posterior", 0, 1)
             found = replace(found, posterior=posterior_of(found, view, held_logs, seen))

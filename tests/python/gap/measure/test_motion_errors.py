@@ -18,6 +18,7 @@ from axisight.gap.measure.motion_errors import (
     speeds_at_samples,
     velocity_from,
 )
+from axisight.gap.measure.torque_traces import signals_of
 from axisight.gap.pipeline import behind_gate
 from axisight.gap.views.targets import TargetsView
 from axisight.logs import lowpass
@@ -72,6 +73,19 @@ def test_they_are_those_of_two_runs_in_mujoco(robot: Robot, logged: bool) -> Non
         np.testing.assert_allclose(errors.before, wanted, rtol=0.02, atol=0.02 * wanted[1])
         # The top of a spectrum has some motion too at 50 Hz, and what is found there is taken for noise.
         assert errors.before[1] > 5 * errors.floor[1]
+
+
+def test_signals_have_the_positions_that_are_compared(robot: Robot) -> None:
+    logs = [MACHINES["coulomb_friction@2"].log(run, QUIET_RAD) for run in (1, 2, 3)]
+    inputs, view = behind_gate(robot, logs[:2], logs[2:], ()).compared(Settings(threads=1))
+    assert isinstance(view, TargetsView)
+    (*_, held) = signals_of(view, inputs.validation, AS_GIVEN, gap_before=np.zeros(robot.n_axes))
+    (log,) = inputs.validation
+    np.testing.assert_array_equal(held["measured_position_rad"], log.position_rad)
+    errors = view.off_by(held["simulated_before_position_rad"].values, log)
+    found = errors_of(robot, logs).position_rad.before
+    # The same numbers, added in another order.
+    np.testing.assert_allclose(np.sqrt(np.mean(errors**2, axis=0)), found, rtol=1e-9)
 
 
 @pytest.mark.parametrize("logged", [True, False])
