@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Literal
 
@@ -180,8 +181,7 @@ class SeparatingExperiment(Experiment):
 
     def __str__(self) -> str:
         """What to do and what it tells, in a sentence or two."""
-        one, *others = (placed(label) for label in self.rivals)
-        other = listed(others, "and")
+        one, other = self._told()
         if not self.decides:
             return (
                 f"No motion within the limits of speed, travel and torque tells {one} from {other}. "
@@ -195,6 +195,12 @@ class SeparatingExperiment(Experiment):
             f"{self.plan}: tells {one} from {other}. The true one is then at least "
             f"{min(np.exp(self.log_ratio), 1e6):.2g} times as likely.{still} {self.plan.beside_the_usual()}"
         )
+
+    def _told(self) -> tuple[str, str]:
+        """Return the first rival that the motion tells from others, and these, in words."""
+        pairs = [p for p in combinations(self.rivals, 2) if p not in self.alike]
+        one = pairs[0][0]
+        return placed(one), listed([placed(b) for a, b in pairs if a == one], "and")
 
 
 @summarized

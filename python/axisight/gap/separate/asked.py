@@ -79,10 +79,24 @@ class Asked:
             return designed(route, question)
         if self.to_show == LIMITS:
             return record(route, found.model)
-        rivals = rivals_of(found, route.view.settings, route.most_rivals)
-        if rivals is not None:
-            return designed(route, rivals)
+        if (experiment := _separating(route, found)) is not None:
+            return experiment
         return record(route, found.model) if out.verdict in _OPEN else None
+
+
+def _separating(route: Route, found: SearchState) -> Experiment | None:
+    """Return the experiment for the closest rivals, or one with more of them that decides; None without rivals."""
+    closest: Experiment | None = None
+    told = 0
+    for most in route.hypotheses:
+        rivals = rivals_of(found, route.view.settings, most)
+        if rivals is None or len(rivals.labels) == told:
+            break
+        made, told = designed(route, rivals), len(rivals.labels)
+        if made.decides:
+            return made
+        closest = closest or made
+    return closest
 
 
 def asked_of(

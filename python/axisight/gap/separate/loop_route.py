@@ -25,7 +25,7 @@ class LoopRoute(Route):
 
     usual = "A multisine on all axes"
     offers_usual = True
-    most_rivals = 2
+    hypotheses = (2, 3)
     view: ClosedLoopView
 
     def __init__(self, view: ClosedLoopView, within: ExperimentLimits | None = None) -> None:

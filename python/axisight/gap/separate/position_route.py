@@ -113,7 +113,7 @@ class PositionRoute(Route):
 class InverseRoute(PositionRoute):
     """Positions that the motors follow; their torque is predicted."""
 
-    most_rivals = 3
+    hypotheses = (3,)
     variants = 6
     view: InverseView
 
@@ -154,7 +154,7 @@ class InverseRoute(PositionRoute):
 class TargetRoute(PositionRoute):
     """Position targets; each machine is simulated in its loop, and positions are compared."""
 
-    most_rivals = 2
+    hypotheses = (2,)
     variants = 4
     view: TargetsView
 

@@ -45,8 +45,10 @@ class Route(ABC):
     """The motion that a designed one is compared with, in words."""
     offers_usual: ClassVar[bool]
     """Whether that motion may be the designed one, too."""
-    most_rivals: ClassVar[int]
-    """Largest number of hypotheses that one experiment tells apart; each pair costs two fits of every motion."""
+    hypotheses: ClassVar[tuple[int, ...]]
+    """Numbers of hypotheses that one experiment tells apart: a larger one where no motion decides for the one before.
+
+    Each pair of hypotheses costs two fits of every motion."""
 
     view: View
     limits: Range

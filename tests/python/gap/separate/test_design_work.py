@@ -9,8 +9,11 @@ from types import ModuleType
 import pytest
 
 from axisight import Diagnosis, diagnose, load_robot
+from axisight.gap.facts.axis_names import placed
 from axisight.gap.facts.experiment import SeparatingExperiment
-from axisight.gap.separate import design
+from axisight.gap.separate import asked, design
+from axisight.gap.separate.rivals import Rivals
+from axisight.gap.separate.route import Route
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -82,3 +85,42 @@ def test_shared_sensitivities_change_no_design(
     assert isinstance(fresh, SeparatingExperiment)
     assert (str(shared.plan), shared.repeats) == (str(fresh.plan), fresh.repeats)
     assert shared.log_ratio == pytest.approx(fresh.log_ratio, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "asked_for"),
+    [
+        # A lag, a delay and a current loop: a motion tells the first two apart.
+        ("lag, delay", [2]),
+        # No motion within one direction of the logs tells an offset from the spring of gravity.
+        ("offset, Coulomb friction", [2, 3]),
+    ],
+)
+def test_more_rivals_are_told_apart_only_where_no_motion_decides_between_the_closest(
+    name: str, asked_for: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Counts, not seconds: a design for three hypotheses costs 2.5 times one for two."""
+    import separating as bench  # noqa: PLC0415 - a bench, on the path just now
+
+    told: list[int] = []
+
+    def counted(route: Route, question: Rivals) -> object:
+        told.append(len(question.labels))
+        return design.designed(route, question)
+
+    monkeypatch.setattr(asked, "designed", counted)
+    row = bench.ROWS[name]
+    robot = bench.simulator(row)
+    machine = bench.machine_of(robot)
+    refs = [row.wave(seed, robot.sample_time_s) for seed in (1, 2, 3)]
+    logs = [bench.log_of(machine, row.withheld, r, k) for k, r in enumerate(refs)]
+    found = diagnose(robot=robot, estimation=logs[:2], validation=logs[2:], separate=True)
+    assert told == asked_for
+    made = found.experiment
+    assert isinstance(made, SeparatingExperiment) and made.decides
+    assert len(made.rivals) == asked_for[-1]
+    # A pair that the motion does not tell apart is said, and is not among those that it tells apart.
+    assert bool(made.alike) == (len(asked_for) > 1)
+    tells, rest = str(made).split(" The true one", 1)
+    for one, other in made.alike:
+        assert placed(one) in tells and placed(other) not in tells and placed(other) in rest
