@@ -109,6 +109,14 @@ def diagnose_command(
             "that was diagnosed. With --with-remainder, a robot file also has the modelled remainder."
         ),
     ] = None,
+    play_joints: Annotated[
+        bool,
+        typer.Option(
+            "--play-joints",
+            rich_help_panel=OUTPUT,
+            help="Write backlash into an MJCF as a joint of its own with a range. Needs --write-model.",
+        ),
+    ] = False,
     verbose: Annotated[
         bool,
         typer.Option(
@@ -329,6 +337,7 @@ def diagnose_command(
             "--acceleration-limit": acceleration_limit,
             "--room": room,
             "--write-model": write_model,
+            "--play-joints": play_joints,
             "--signals": signals,
             "--posterior": posterior,
             "--simulated": simulated,
@@ -391,6 +400,8 @@ def diagnose_command(
         asked = None if experiment_on is None else experiment_on(inputs.robot)
         if remainder_table is not None and not with_remainder:
             raise InputError("--remainder-table: expected --with-remainder beside it, got none")
+        if play_joints and write_model is None:
+            raise InputError("--play-joints: expected --write-model beside it, got none")
         outputs = Outputs(
             json,
             report,
@@ -401,6 +412,7 @@ def diagnose_command(
             next_experiment,
             to_show is not None,
             force,
+            play_joints,
         )
         outputs.check(inputs, [*inputs.files(), *_described(case_or_logs, columns)])
         settings = Settings(

@@ -54,7 +54,13 @@ def write_found_posterior(found: Diagnosis, target: Path) -> None:
 
 
 def write_found_model(
-    found: Diagnosis, inputs: Inputs, options: ModelOptions, target: Path, *, force: bool
+    found: Diagnosis,
+    inputs: Inputs,
+    options: ModelOptions,
+    target: Path,
+    *,
+    force: bool,
+    play_joints: bool = False,
 ) -> None:
     """Write the simulator with the causes found, and print what the file cannot state.
 
@@ -74,6 +80,7 @@ def write_found_model(
         refit=found.refit,
         overwrite=force,
         drives=options.drives(inputs.robot_source) if options.given() else None,
+        play_joints=play_joints,
         remainder=modelled,
     )
     say(f"model: {made.path}, with {', '.join(made.placed) or 'none'}")

@@ -39,7 +39,8 @@ _RESULTS = {
 class Outputs:
     """The requested output files of a diagnosis, None for options not given.
 
-    ``to_show``: the experiment must show an effect. ``force``: any existing file may be replaced.
+    ``to_show``: the experiment must show an effect. ``force``: any existing file may be replaced. ``play_joints``:
+    an MJCF gets a joint for backlash.
     """
 
     json: Path | None
@@ -51,6 +52,7 @@ class Outputs:
     next_experiment: Path | None
     to_show: bool
     force: bool
+    play_joints: bool = False
 
     def given(self) -> list[str]:
         """Return the given options, each of which prints a line when its file is written."""
@@ -102,8 +104,8 @@ class Outputs:
             folder = self.next_experiment
             out.append(partial(write_found_experiment, found, folder, to_show=self.to_show))
         if self.model is not None:
-            made = partial(write_found_model, found, inputs, options, self.model, force=self.force)
-            out.append(made)
+            write = partial(write_found_model, force=self.force, play_joints=self.play_joints)
+            out.append(partial(write, found, inputs, options, self.model))
         if self.signals is not None:
             out.append(partial(write_found_signals, found, self.signals))
         if self.posterior is not None:

@@ -338,7 +338,7 @@ def _no_number(root: Element, effect: Effect) -> str:
         return "MJCF has no number for it: axisight.mujoco.apply adds it at every step"
     if root.tag == "mujoco" and effect.name == PLAY[0]:
         return (
-            "MJCF has no number for it: write_model(..., play_joints=True) writes a joint with a range, "
+            "MJCF has no number for it: --play-joints, or play_joints=True, writes a joint with a range, "
             "axisight.mujoco.apply adds it to a joint that is the gear's spring"
         )
     if root.tag == "mujoco" and acts_in_gear(effect):

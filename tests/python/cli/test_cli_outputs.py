@@ -80,6 +80,10 @@ def test_diagnose_tries_its_outputs_before_the_work(case, no_work, option):
     assert "expected a folder" in said
 
 
+def test_play_joints_need_a_model_to_write(case, no_work):
+    assert "expected --write-model beside it" in run("diagnose", case, "--play-joints", status=2)
+
+
 def test_diagnose_replaces_neither_log_nor_robot_nor_case(case, no_work):
     for name in ("logs/moves.parquet", "robot.toml", "case.toml"):
         assert "got an input" in run("diagnose", case, "--json", case / name, status=2)

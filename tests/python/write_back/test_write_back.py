@@ -403,7 +403,7 @@ def test_what_has_no_place_is_told_why(tmp_path: Path):
     assert made.path.read_bytes() == source.read_bytes()
     assert [effect.label for effect in made.remaining] == [c.label for c in causes]
     assert made.why == {
-        "backlash@1": "MJCF has no number for it: write_model(..., play_joints=True) writes a joint with a range, "
+        "backlash@1": "MJCF has no number for it: --play-joints, or play_joints=True, writes a joint with a range, "
         "axisight.mujoco.apply adds it to a joint that is the gear's spring",
         "load_dependent_friction@1": "MJCF has no number for it: axisight.mujoco.apply adds it at every step",
         "viscous_friction@1": "damping would be -2499, and models have none below zero",

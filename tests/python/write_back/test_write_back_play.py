@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from axisight import load_robot
+from axisight.cli.outcomes import write_found_model
 from axisight.write_back import write_model
 from found_causes import several
 from import_data import MJCF, changed, written
@@ -80,3 +83,17 @@ def test_play_and_other_causes_of_a_joint_are_written_together(tmp_path: Path):
     assert model.dof_frictionloss[0] == pytest.approx(2.5)
     assert model.dof_frictionloss[1] == 0
     assert model.joint("play of shoulder").id == 1
+
+
+def test_the_command_line_writes_a_play_joint_where_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    source = written(tmp_path, ARM.format(unit="radian"), "arm.xml")
+    inputs: Any = SimpleNamespace(robot=load_robot(source), robot_source=source)
+    options: Any = SimpleNamespace(given=lambda: False)
+    found: Any = SimpleNamespace(causes=(PLAY,), refit={}, remainder=None)
+    for asked in (False, True):
+        new = tmp_path / f"new_{asked}.xml"
+        write_found_model(found, inputs, options, new, force=False, play_joints=asked)
+        assert ("--play-joints" in " ".join(capsys.readouterr().out.split())) != asked
+        assert mujoco.MjModel.from_xml_path(str(new)).njnt == 1 + asked
